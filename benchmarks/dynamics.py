@@ -109,7 +109,7 @@ def proof():
 
     def run():
         survey = effort_survey(dynamics, breaks, coefficients, effort)
-        return [peak.most for peak in (*survey.highest(), *survey.lowest())]
+        return [peak.upper_bound for peak in (*survey.highest(), *survey.lowest())]
 
     return run, lambda _: [0.0]
 

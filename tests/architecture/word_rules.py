@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
 
-from sources import Offence, Planted, Rule, Sources
+from sources import HOUSE, ROOT, Offence, Planted, Rule, Sources
 
 HOMONYMS: dict[str, str] = {}
 """Why one public class name has two meanings: at most three."""
@@ -33,6 +34,23 @@ PRIVATE_WORDS = frozenset(
     ]
 )
 """Words that the field does not use for what we mean: none stands in a name, or in the title of a module."""
+
+PROOFS = tuple(
+    file.removeprefix(f"{HOUSE}/")
+    for subject in tomllib.loads((ROOT / "tests/mutants/subjects.toml").read_text("utf-8"))["subject"]
+    for file in subject["files"]
+)
+"""The files that prove or judge: those that `make mutants` walks."""
+
+WORDS_OF_PROOFS = {
+    "most": "upper_bound",
+    "known": "what it holds",
+    "room": "slack",
+    "rooms": "slacks",
+    "rest": "remainder",
+    "rub": "friction",
+}
+"""What an array of a proof is not called, and the word of the field that stands in its place."""
 
 PLACE = ("place", "places")
 PLACES = ("job/", "cli/", "planning/", "errors.py")
@@ -125,6 +143,14 @@ def names_are_words_of_the_field(sources: Sources) -> Iterator[Offence]:
         for name, line in sorted(names, key=lambda each: (each[1], each[0])):
             for word in _private(sources, path, words_of(name)):
                 yield Offence(f"{path} {name}", f"line {line} says `{word}`")
+
+
+def proofs_say_what_their_arrays_are(sources: Sources) -> Iterator[Offence]:
+    for path in sorted(sources.nodes.keys() & {*PROOFS}):
+        names = {(line, name) for node in sources.nodes[path] for name, line in _defined(node)}
+        for line, name in sorted(names):
+            if better := WORDS_OF_PROOFS.get(name.strip("_")):
+                yield Offence(f"{path} {name}", f"line {line} says `{name}`, not `{better}`")
 
 
 def _private(sources: Sources, path: str, words: list[str]) -> list[str]:
@@ -241,5 +267,23 @@ RULES = [
         ],
         NEEDED_WORDS,
         most=3,
+    ),
+    Rule(
+        proofs_say_what_their_arrays_are,
+        [
+            Planted(
+                {"checks/verify.py": "upper_bound = 1\n", "cli/app.py": "rest = 1\n"},
+                {
+                    "checks/verify.py": "for most in range(2):\n    x.most = most\n",
+                    "judge/ends.py": "def _room(rest):\n    return rest\n",
+                },
+                [
+                    Offence("checks/verify.py most", "line 1 says `most`, not `upper_bound`"),
+                    Offence("checks/verify.py most", "line 2 says `most`, not `upper_bound`"),
+                    Offence("judge/ends.py _room", "line 1 says `_room`, not `slack`"),
+                    Offence("judge/ends.py rest", "line 1 says `rest`, not `remainder`"),
+                ],
+            )
+        ],
     ),
 ]

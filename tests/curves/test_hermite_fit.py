@@ -183,8 +183,8 @@ def test_a_function_that_no_quintics_follow_is_named_with_its_place():
 
 def test_the_number_of_pieces_is_bounded():
     with pytest.raises(FitError):
-        fit(known(waves), within(1e-9), ENDS, nothing, most=20)
-    assert fit(known(waves), within(1e-9), ENDS, nothing, most=400).pieces <= 400
+        fit(known(waves), within(1e-9), ENDS, nothing, at_most=20)
+    assert fit(known(waves), within(1e-9), ENDS, nothing, at_most=400).pieces <= 400
 
 
 @pytest.mark.parametrize("width", [1e-5, 1e-7])

@@ -107,13 +107,13 @@ def test_the_largest_of_a_wave_is_found_and_bounded(rate, sign, entry):
     found = survey.largest(0, lambda entries: entries @ weights, lambda _: 1e-8)
     t = np.linspace(0.1, 1.3, 200_001)
     wave = sign * (np.cos, np.sin)[entry](rate * t)
-    assert wave.max() - 1e-9 <= found.most <= wave.max() + 3e-8
-    assert found.value <= found.most
+    assert wave.max() - 1e-9 <= found.upper_bound <= wave.max() + 3e-8
+    assert found.value <= found.upper_bound
     assert found.value >= wave.max() - 3e-8
     assert sign * (np.cos, np.sin)[entry](rate * found.time) == pytest.approx(found.value, abs=1e-7)
     np.testing.assert_allclose(found.entries @ weights, found.value)
     circle = survey.largest(0, norm, lambda _: 1e-8, least=0.0)
-    assert 1.0 <= circle.most <= 1.0 + 3e-8
+    assert 1.0 <= circle.upper_bound <= 1.0 + 3e-8
 
 
 def test_pieces_are_halved_until_the_remainder_is_small_in_each_function():
@@ -171,10 +171,10 @@ def test_a_slower_piece_that_is_less_well_known_counts_with_what_it_may_be():
     for order in (slice(None), slice(None, None, -1)):
         found = rest_of(rows[order], np.array([1e-9, 0.5])[order])
         assert found.value == pytest.approx(1.0, rel=1e-12)
-        assert found.most == pytest.approx(1.4, rel=1e-12)
+        assert found.upper_bound == pytest.approx(1.4, rel=1e-12)
         wavy = rows[:1] + [0, 0, 1] * np.sin(5 * NODES)[:, None]
         both = np.concatenate([wavy, rows[1:]])
-        assert rest_of(both[order], np.array([1e-9, 0.5])[order]).most == pytest.approx(1.4, rel=1e-12)
+        assert rest_of(both[order], np.array([1e-9, 0.5])[order]).upper_bound == pytest.approx(1.4, rel=1e-12)
 
 
 @pytest.mark.parametrize("piece", [0, 1, 2])
@@ -185,7 +185,7 @@ def test_a_peak_in_any_part_of_any_piece_is_found(piece, where, sign):
     values = np.tile(-(NODES**2), (3, 1))
     values[piece] = 2.0 - 3.0 * (NODES - where) ** 2
     found = rest_of(sign * values[..., None], (0.0, 0.0, 0.0), lambda x: sign * total(x), 1e-10, -np.inf)
-    assert 2.0 - 1e-12 <= found.most <= 2.0 + 2e-10
+    assert 2.0 - 1e-12 <= found.upper_bound <= 2.0 + 2e-10
     assert found.value == pytest.approx(2.0, abs=1e-9)
     assert found.time == pytest.approx(1.0 + 2.0 * (piece + where), abs=2e-4)
 
@@ -193,9 +193,11 @@ def test_a_peak_in_any_part_of_any_piece_is_found(piece, where, sign):
 @pytest.mark.parametrize("remainder", [1e-3, 0.2])
 def test_the_remainder_of_the_piece_is_added_once(remainder):
     values = np.stack([2.0 - (NODES - 0.4) ** 2, 1.0 + 0 * NODES])[..., None]
-    assert rest_of(values, (remainder, 0.0), total).most == pytest.approx(2.0 + remainder, rel=1e-8)
-    assert rest_of(values, (0.0, remainder), total).most == pytest.approx(2.0, rel=1e-8)
-    assert rest_of(values, (0.0, 1.0 + remainder), total).most == pytest.approx(2.0 + remainder, rel=1e-8)
+    assert rest_of(values, (remainder, 0.0), total).upper_bound == pytest.approx(2.0 + remainder, rel=1e-8)
+    assert rest_of(values, (0.0, remainder), total).upper_bound == pytest.approx(2.0, rel=1e-8)
+    assert rest_of(values, (0.0, 1.0 + remainder), total).upper_bound == pytest.approx(
+        2.0 + remainder, rel=1e-8
+    )
 
 
 def test_parts_of_a_piece_keep_its_remainder():
@@ -203,19 +205,19 @@ def test_parts_of_a_piece_keep_its_remainder():
     humps = np.stack([2.0 - 9.0 * (NODES - 0.7) ** 2, 1.9 - 9.0 * (NODES - 0.2) ** 2])[..., None]
     for order in (slice(None), slice(None, None, -1)):
         found = rest_of(humps[order], np.array([0.0, 0.5])[order], total)
-        assert 2.4 - 1e-9 <= found.most <= 2.42
+        assert 2.4 - 1e-9 <= found.upper_bound <= 2.42
 
 
 def test_functions_of_one_survey_are_apart():
     values = np.stack([np.full((1, 9, 1), 3.0), np.full((1, 9, 1), 2.0)], axis=2)
     survey = NodeSurvey(np.zeros(1), np.ones(1), values, np.array([[0.5, 0.25]]))
     found = [survey.largest(function, total, lambda _: 1e-9) for function in (0, 1)]
-    np.testing.assert_allclose([(one.value, one.most) for one in found], [(3.0, 3.5), (2.0, 2.25)])
+    np.testing.assert_allclose([(one.value, one.upper_bound) for one in found], [(3.0, 3.5), (2.0, 2.25)])
 
 
 def test_all_negative_efforts_have_a_negative_peak():
     found = rest_of((-5.0 + NODES)[None, :, None], (0.0,), total, 1e-9, -np.inf)
-    assert (found.value, found.most, found.time) == (pytest.approx(-4.0), pytest.approx(-4.0), 3.0)
+    assert (found.value, found.upper_bound, found.time) == (pytest.approx(-4.0), pytest.approx(-4.0), 3.0)
 
 
 def test_the_hull_comes_as_near_as_is_asked_for():
@@ -224,13 +226,13 @@ def test_the_hull_comes_as_near_as_is_asked_for():
     true = np.polyval(-np.poly([0.1, 0.45, 0.55, 0.9]), np.linspace(0, 1, 100_001)).max()
     for slack in (1e-3, 1e-6, 1e-9):
         found = rest_of(values, (0.0,), total, slack, -np.inf)
-        assert true - 1e-11 <= found.most <= true + 2 * slack
-        assert found.most - found.value <= slack
+        assert true - 1e-11 <= found.upper_bound <= true + 2 * slack
+        assert found.upper_bound - found.value <= slack
 
 
 @pytest.mark.parametrize("wrong", [np.inf, np.nan])
 def test_what_no_float_holds_is_not_proven(wrong):
     values = np.ones((1, 9, 2))
-    assert rest_of(values, (wrong,)).most == np.inf
+    assert rest_of(values, (wrong,)).upper_bound == np.inf
     values[0, 3, 1] = wrong
-    assert rest_of(values).most == np.inf
+    assert rest_of(values).upper_bound == np.inf

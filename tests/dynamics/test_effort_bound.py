@@ -82,15 +82,15 @@ def require_sound_and_tight(seed):
     efforts = dense(dynamics, breaks, coefficients)
     scale = np.abs(efforts).max(axis=0)
     for sign, peaks in ((1, survey.highest()), (-1, survey.lowest())):
-        most = np.array([peak.most for peak in peaks])
+        upper_bound = np.array([peak.upper_bound for peak in peaks])
         near = np.array([efforts_near(dynamics, breaks, coefficients, peak.time) for peak in peaks])
         sampled = np.maximum((sign * efforts).max(axis=0), (sign * near).max(axis=1).diagonal())
-        assert (most >= sampled - 1e-9 * scale).all()
-        assert (most <= sampled + 1e-4 * scale).all()
+        assert (upper_bound >= sampled - 1e-9 * scale).all()
+        assert (upper_bound <= sampled + 1e-4 * scale).all()
         for joint, peak in enumerate(peaks):
             assert sum(peak.parts) == pytest.approx(peak.value, abs=1e-12 * scale[joint])
             assert breaks[0] <= peak.time <= breaks[-1]
-            assert peak.value <= peak.most
+            assert peak.value <= peak.upper_bound
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -170,7 +170,7 @@ def test_a_planted_peak_between_rows_is_found(length):
     found = effort_survey(lift(), np.array([0.0, length]), hidden_motion(1e-4, length)).highest()[0]
     true = 5.0 * (9.81 + 1.0001)
     assert found.value == pytest.approx(true, rel=1e-6)
-    assert true * (1 - 1e-12) <= found.most <= true * (1 + 1e-6)
+    assert true * (1 - 1e-12) <= found.upper_bound <= true * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("length", [0.05, 1.0, 7.0])
@@ -179,13 +179,15 @@ def test_the_remainder_covers_a_peak_that_no_row_shows(length, monkeypatch):
     dynamics, size = lift(gravity=0.0), 1e-8
     motion = hidden_motion(size, length)
     found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
-    assert found.most - 5.0 >= 5.0 * size * (1 - 1e-5)
+    assert found.upper_bound - 5.0 >= 5.0 * size * (1 - 1e-5)
     monkeypatch.setattr(effort_bound, "_HALVINGS", 0)
     found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
-    assert 5.0 * size * (1 - 1e-5) <= found.most - 5.0 <= 2.1 * 5.0 * size
+    assert 5.0 * size * (1 - 1e-5) <= found.upper_bound - 5.0 <= 2.1 * 5.0 * size
     monkeypatch.setattr(node_bound, "BETWEEN_NODES", node_bound.BETWEEN_NODES / 10)
     found = effort_survey(dynamics, np.array([0.0, length]), motion).highest()[0]
-    assert found.most - 5.0 < 5.0 * size * 0.5  # ten times too small a remainder would be noticed above
+    assert (
+        found.upper_bound - 5.0 < 5.0 * size * 0.5
+    )  # ten times too small a remainder would be noticed above
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -216,7 +218,7 @@ def test_a_peak_is_as_near_as_the_smaller_of_two_limits_asks(sign):
         np.array([[-1.0, 1e3] if sign > 0 else [-1e3, 1.0]]),
     )
     found = survey.peak(0, -sign)
-    assert free * (1 - 1e-9) <= found.most <= free * (1 + 2e-7)
+    assert free * (1 - 1e-9) <= found.upper_bound <= free * (1 + 2e-7)
     assert found.time == pytest.approx(at, abs=1e-3)
 
 
@@ -225,8 +227,8 @@ def test_coulomb_friction_jumps_where_a_joint_turns_back():
     coefficients = np.array([1.0, -1.0, 0.0])[:, None, None]  # qd = 2 t - 1, qdd = 2
     survey = effort_survey(dynamics, np.array([0.0, 1.0]), coefficients)
     high, low = survey.highest()[0], survey.lowest()[0]
-    assert high.most == pytest.approx(2.0 * 11.81 + 3.0)
-    assert low.most == pytest.approx(-2.0 * 11.81 + 3.0)
+    assert high.upper_bound == pytest.approx(2.0 * 11.81 + 3.0)
+    assert low.upper_bound == pytest.approx(-2.0 * 11.81 + 3.0)
     assert high.time == pytest.approx(0.5, abs=1e-9) or high.time > 0.5
     assert high.parts == pytest.approx((4.0, 0.0, 3.0, 19.62))
 
@@ -234,7 +236,7 @@ def test_coulomb_friction_jumps_where_a_joint_turns_back():
 def test_a_motion_of_no_length_asks_for_nothing():
     survey = effort_survey(lift(), np.array([2.0, 2.0]), np.zeros((2, 1, 1)))
     for peak in (survey.highest()[0], survey.lowest()[0]):
-        assert (peak.value, peak.most, peak.parts, peak.time) == (0.0, 0.0, (0.0,) * 4, 2.0)
+        assert (peak.value, peak.upper_bound, peak.parts, peak.time) == (0.0, 0.0, (0.0,) * 4, 2.0)
     assert needed_stretch(survey, 0, 1, 1.0, 1e-6).factor == 1.0
 
 
@@ -242,18 +244,18 @@ def test_peaks_are_of_the_motion_as_it_is_unless_asked_otherwise():
     """m (a / k^2 + g) and v / k, by hand: a lift that is stretched to k times as long."""
     coefficients = np.array([2.0, 0.0, 0.0])[:, None, None]  # qdd = 4 up to qd = 4
     survey = effort_survey(lift(5.0, Friction(1.0, 2.0)), np.array([0.0, 1.0]), coefficients)
-    assert survey.peak(0, 1).most == pytest.approx(20.0 + 49.05 + 1.0 + 8.0)
-    assert survey.peak(0, 1, 2.0).most == pytest.approx(5.0 + 49.05 + 1.0 + 4.0)
-    assert survey.highest(2.0)[0].most == pytest.approx(5.0 + 49.05 + 1.0 + 4.0)
-    assert survey.lowest(2.0)[0].most == pytest.approx(-5.0 - 49.05 - 1.0)
-    assert survey.peak(0, 1, np.inf).most == pytest.approx(50.05)
+    assert survey.peak(0, 1).upper_bound == pytest.approx(20.0 + 49.05 + 1.0 + 8.0)
+    assert survey.peak(0, 1, 2.0).upper_bound == pytest.approx(5.0 + 49.05 + 1.0 + 4.0)
+    assert survey.highest(2.0)[0].upper_bound == pytest.approx(5.0 + 49.05 + 1.0 + 4.0)
+    assert survey.lowest(2.0)[0].upper_bound == pytest.approx(-5.0 - 49.05 - 1.0)
+    assert survey.peak(0, 1, np.inf).upper_bound == pytest.approx(50.05)
 
 
 @pytest.mark.filterwarnings("error")
 def test_what_no_float_holds_is_not_proven():
     with np.errstate(over="ignore", invalid="ignore"):
         survey = effort_survey(lift(), np.array([0.0, 1.0]), np.full((3, 1, 1), 1e308))
-    assert survey.highest()[0].most == np.inf
+    assert survey.highest()[0].upper_bound == np.inf
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -333,7 +335,11 @@ def test_stretch_is_the_smallest(seed):
     breaks, coefficients = random_motion(rng, len(dynamics.links))
     survey, joint = effort_survey(dynamics, breaks, coefficients), 0
     static = max(peak.static for peak in (survey.highest(1e6)[joint], survey.lowest(1e6)[joint]))
-    limit = 1.2 * static + 0.3 * max(survey.highest()[joint].most, survey.lowest()[joint].most) + 0.1
+    limit = (
+        1.2 * static
+        + 0.3 * max(survey.highest()[joint].upper_bound, survey.lowest()[joint].upper_bound)
+        + 0.1
+    )
     needed = max(needed_stretch(survey, joint, sign, limit, 0.0).factor for sign in (1, -1))
     powers = np.arange(len(coefficients) - 1, -1, -1)[:, None, None]
     for share, kept in ((1.0, True), (0.999, needed == 1.0)):
@@ -347,4 +353,4 @@ def test_payload_takes_its_share():
     survey = effort_survey(
         InverseDynamics(heavy), np.array([0.0, 1.0]), np.array([2.0, 0.0, 0.0])[:, None, None]
     )
-    assert survey.highest()[0].most == pytest.approx(8.0 * 13.81)
+    assert survey.highest()[0].upper_bound == pytest.approx(8.0 * 13.81)

@@ -79,7 +79,7 @@ def tool(
 
 
 def most(each: SampledTool) -> list[float | None]:
-    return [None if bound is None else bound.most for bound in each.bounds]
+    return [None if bound is None else bound.upper_bound for bound in each.bounds]
 
 
 @pytest.mark.parametrize("times", [1.5, 0.9])
@@ -177,10 +177,10 @@ def test_what_hides_between_nodes_is_bounded_by_no_less_than_it_is(orientation: 
     coefficients = np.zeros((2, 1, 7))
     coefficients[0, 0, joint], coefficients[1, 0, :6] = rate, Q
     path = ToolPath(line(), WHOLE, orientation)  # type: ignore[arg-type]
-    _, ((_, highest),) = path_bound._known(ROBOT, path, coefficients, np.array([1e-6]))
+    _, ((_, highest),) = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
     assert 1.0 <= highest * math.factorial(9) / rate**9 <= 100.0
     t = np.arange(9) * 0.2
-    values, _ = path_bound._known(ROBOT, path, coefficients, np.array([t[-1]]))
+    values, _ = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([t[-1]]))
     apart = np.linalg.norm(np.diff(values[0, :, 1], axis=0), axis=-1)
     np.testing.assert_allclose(apart, 2 * np.sin(rate * 0.2 / 2), rtol=1e-9)  # a chord, as of the angle
 

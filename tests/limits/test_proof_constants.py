@@ -63,14 +63,14 @@ def test_a_peak_that_no_row_shows_is_within_the_bound(quantity, name, order, siz
     assert true == pytest.approx(size * peak, rel=1e-11)
     found = tool_bounds(robot, np.array([0.0, length]), coefficients)[quantity]
     assert found.value <= true * (1 + 1e-12)
-    assert found.most >= true * (1 - 1e-12)
-    assert found.most - size >= (1 - 1e-6) * (true - size)
+    assert found.upper_bound >= true * (1 - 1e-12)
+    assert found.upper_bound - size >= (1 - 1e-6) * (true - size)
     monkeypatch.setattr(tool_bound, "_HALVINGS", 0)  # which would hide that a remainder is too large
     found = tool_bounds(robot, np.array([0.0, length]), coefficients)[quantity]
     # Isaacson and Keller bound the product by 8!/4 (h/8)^9, about twice what it is; of degree 9 the ninth derivative
     # is the same everywhere
     remainder = size * abs(shown[0]) * factorial(8) / 4 / 8**9
-    assert found.most - size == pytest.approx(remainder, rel=1e-5)
+    assert found.upper_bound - size == pytest.approx(remainder, rel=1e-5)
 
 
 @pytest.mark.parametrize("size", [1e-3, 2e-3])
@@ -85,8 +85,8 @@ def test_a_slow_tool_is_known_as_well(size):
     true = np.polyval(np.polyder(joint), np.linspace(0.0, 1.0, 20_001)).max()
     assert true == pytest.approx(size * (1 + 10 * HIDDEN), rel=1e-9)
     found = tool_bounds(robot, np.array([0.0, 1.0]), coefficients)[SPEED]
-    assert found.most >= true * (1 - 1e-12)
-    assert found.most <= found.value * (1 + 1e-6)
+    assert found.upper_bound >= true * (1 - 1e-12)
+    assert found.upper_bound <= found.value * (1 + 1e-6)
 
 
 def test_many_equal_peaks_are_all_known_well():
@@ -97,4 +97,4 @@ def test_many_equal_peaks_are_all_known_well():
     coefficients[-1, :, 0] = step * np.arange(count)
     found = tool_bounds(load_robot("cartesian"), duration * np.arange(count + 1), coefficients)[SPEED]
     true = 1.5 * step / duration
-    assert true * (1 - 1e-9) <= found.most <= true * (1 + 1e-6)
+    assert true * (1 - 1e-9) <= found.upper_bound <= true * (1 + 1e-6)

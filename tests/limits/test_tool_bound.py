@@ -44,8 +44,8 @@ def test_a_crank_has_the_speed_of_its_joint() -> None:
     assert spin.value == pytest.approx(1.0, rel=WITHIN)
     assert speed.value == pytest.approx(reach, rel=WITHIN)
     assert speed.time == pytest.approx(3.0, abs=1e-3)
-    assert 1.0 <= spin.most <= 1.0 + WITHIN
-    assert reach * (1 - 1e-12) <= speed.most <= reach * (1 + WITHIN)
+    assert 1.0 <= spin.upper_bound <= 1.0 + WITHIN
+    assert reach * (1 - 1e-12) <= speed.upper_bound <= reach * (1 + WITHIN)
 
 
 def test_between_rows_the_tool_is_as_near_as_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,7 +61,7 @@ def test_between_rows_the_tool_is_as_near_as_is_said(monkeypatch: pytest.MonkeyP
     apart = np.linalg.norm(beside - velocity, axis=1).max()
     (speed, *_) = tool_bounds(robot, np.array([0.0, length]), coefficients)
     largest = np.linalg.norm(beside, axis=1).max()
-    assert apart <= speed.most - largest < 10 * apart
+    assert apart <= speed.upper_bound - largest < 10 * apart
 
 
 @pytest.mark.parametrize("name", ["ur5e", "panda", "cobra600", "planar3r", "scorbot"])
@@ -74,8 +74,8 @@ def test_no_peak_hides_between_rows(name: str, degree: int) -> None:
         coefficients = RNG.normal(size=(degree + 1, 3, len(robot.joints))) * 0.8
         found = tool_bounds(robot, breaks, coefficients)
         for one, largest in zip(found, dense(robot, breaks, coefficients), strict=True):
-            assert largest <= one.most
-            assert one.most <= one.value * (1 + WITHIN) + 1e-9
+            assert largest <= one.upper_bound
+            assert one.upper_bound <= one.value * (1 + WITHIN) + 1e-9
             assert one.value <= largest * (1 + WITHIN) + 1e-9
 
 
@@ -84,4 +84,4 @@ def test_a_tool_that_rests_has_no_speed() -> None:
     still = np.concatenate([np.zeros((5, 1, 6)), np.full((1, 1, 6), 0.3)])
     for breaks in ([1.0, 2.0], [1.0, 1.0]):
         for one in tool_bounds(robot, np.array(breaks), still):
-            assert one.value == one.most == 0.0
+            assert one.value == one.upper_bound == 0.0

@@ -101,12 +101,12 @@ def check_continuity(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    known = peaks_by_move(trajectory) if peaks is None else peaks
+    peaks_of_moves = peaks_by_move(trajectory) if peaks is None else peaks
     spans, limited = _span_of_pieces(trajectory), _limited_spans(trajectory, limits_by_move)
     findings: list[Finding] = []
     for order in range(3):
         found = []
-        for jumps in _jumps(trajectory, order, known, spans):
+        for jumps in _jumps(trajectory, order, peaks_of_moves, spans):
             if order < 2:
                 found.append(jumps.chosen(jumps.present, jumps.later))
                 continue

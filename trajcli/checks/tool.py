@@ -136,8 +136,8 @@ def _check_path(tool: SampledTool) -> list[Finding]:
     for (kind, what, dimension, limit), sizes, bound in zip(kinds, tool.deviation, tool.bounds, strict=True):
         worst = int(sizes.argmax())
         value, when, method = float(sizes[worst]), float(tool.times[worst]), sampled
-        if bound is not None and bound.most > max(value, limit * (1 + PATH_RELATIVE)):
-            value, when, method = bound.most, bound.time, bounded
+        if bound is not None and bound.upper_bound > max(value, limit * (1 + PATH_RELATIVE)):
+            value, when, method = bound.upper_bound, bound.time, bounded
         if exceeds(value, limit):
             when += tool.span.start
             finding = Finding(
@@ -164,8 +164,8 @@ def _check_speeds(tool: SampledTool) -> Iterator[Finding]:
     promised = (tool.motion.tolerance.position, tool.motion.tolerance.angle)
     for run in tool.speed_runs:
         for kind, limit, peak, off in zip(SPEED_KINDS, run.limits, run.peaks, promised, strict=True):
-            if not peak.most <= limit * (1 + TOOL_RELATIVE + 2 * off):
-                found = tool_excess(kind, peak.most, limit, tool.span.start + peak.time)
+            if not peak.upper_bound <= limit * (1 + TOOL_RELATIVE + 2 * off):
+                found = tool_excess(kind, peak.upper_bound, limit, tool.span.start + peak.time)
                 where = "segment {}" if run.segments[0] == run.segments[1] else "segments {} to {}"
                 message = f"{where.format(*run.segments)}: {found.message}"
                 yield replace(found, move=tool.span.index, message=message)
@@ -173,8 +173,8 @@ def _check_speeds(tool: SampledTool) -> Iterator[Finding]:
 
 def _check_branch(tool: SampledTool) -> list[Finding]:
     """Return where the arm passes from one branch to another: the determinant of its rows changes sign."""
-    known = tool.determinants
-    changes = changes_of_sign(known) if known is not None else np.empty(0)
+    determinants = tool.determinants
+    changes = changes_of_sign(determinants) if determinants is not None else np.empty(0)
     if not changes.size:
         return []
     when = tool.span.start + float(tool.times[changes[0] - 1])

@@ -71,8 +71,8 @@ class Verdict:
 
         Times count from the start of the move; None on a path, and where no limit asks for them.
         """
-        known: list[Any] = [of_span.get("tool") for of_span in self.surveys]
-        return tuple(None if each is None or each.motion is not None else each.peaks for each in known)
+        surveys: list[Any] = [of_span.get("tool") for of_span in self.surveys]
+        return tuple(None if each is None or each.motion is not None else each.peaks for each in surveys)
 
     @cached_property
     def by_position(self) -> tuple[tuple[ApproachUse, ...], ...]:
@@ -80,14 +80,14 @@ class Verdict:
 
         One for each joint that has such, times on the curve.
         """
-        known: list[Any] = [of_span.get("velocity_by_position") for of_span in self.surveys]
-        return tuple(() if each is None else each.uses for each in known)
+        surveys: list[Any] = [of_span.get("velocity_by_position") for of_span in self.surveys]
+        return tuple(() if each is None else each.uses for each in surveys)
 
     @cached_property
     def efforts(self) -> tuple[MoveEfforts | None, ...]:
         """For each span the largest efforts, times on the curve; None where no limit asks for them."""
-        known: list[Any] = [of_span.get("effort") for of_span in self.surveys]
-        return tuple(known)
+        surveys: list[Any] = [of_span.get("effort") for of_span in self.surveys]
+        return tuple(surveys)
 
     @property
     def passed(self) -> bool:
@@ -166,12 +166,12 @@ def check_limits(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    known = peaks_by_move(trajectory) if peaks is None else peaks
+    peaks_of_moves = peaks_by_move(trajectory) if peaks is None else peaks
     findings: list[Finding] = []
-    for k in moves_over(known, limits_by_move):
+    for k in moves_over(peaks_of_moves, limits_by_move):
         if whole is None or whole[k]:
             span, limits = trajectory.spans[k], limits_by_move[k]
-            survey = JointSurvey(known[k], limits, span.duration > 0)
+            survey = JointSurvey(peaks_of_moves[k], limits, span.duration > 0)
             findings += limit_findings(LimitedMove(trajectory, span, limits), survey)
     return findings
 
@@ -273,10 +273,10 @@ def _with_remedies(
     alone = all(finding.factor is not None for finding in findings)
     smoother = next((f.hint for f in findings if f.kind == "acceleration_jump"), None)
     for finding in findings:
-        known = finding
+        remedied = finding
         if finding.kind == "jerk" and smoother is not None:  # what joins the acceleration limits the jerk
-            known = replace(finding, hint=promise.remedies.get("acceleration_jump", smoother))
-        yield _with_remedy(known, trajectory, span, promise, factor, alone=alone)
+            remedied = replace(finding, hint=promise.remedies.get("acceleration_jump", smoother))
+        yield _with_remedy(remedied, trajectory, span, promise, factor, alone=alone)
 
 
 def longest_factor(findings: Sequence[Finding]) -> float | None:
@@ -284,9 +284,9 @@ def longest_factor(findings: Sequence[Finding]) -> float | None:
 
     The limits' own room for rounding is used, so that a factor is not shown above what is enough.
     """
-    rooms = {"exact": LIMIT_RELATIVE, "bounded": TOOL_RELATIVE, "sampled": TOOL_RELATIVE}
+    slacks = {"exact": LIMIT_RELATIVE, "bounded": TOOL_RELATIVE, "sampled": TOOL_RELATIVE}
     return max(
-        (f.factor * (1 - rooms[f.method] * _PART) for f in findings if f.factor is not None), default=None
+        (f.factor * (1 - slacks[f.method] * _PART) for f in findings if f.factor is not None), default=None
     )
 
 

@@ -160,7 +160,7 @@ class VelocityTowardsEnds(_AtPeriod):
         margin = self.number("margin")
         bound = np.maximum(np.where(rates > 0, high, -low) - margin, 0.0)
         excess = np.abs(rates) - bound * (1 + _ROUNDING)
-        room = rounding_noise(1, np.spacing(np.abs(before)), period)
+        slack = rounding_noise(1, np.spacing(np.abs(before)), period)
 
         def fields(index: int, joint: int) -> dict[str, Any]:
             value, allowed = float(rates[index, joint]), float(bound[index, joint])
@@ -178,7 +178,7 @@ class VelocityTowardsEnds(_AtPeriod):
                 "hint": "slow it down towards the end of the range, or stay further away from it",
             }
 
-        self.note_rows(rows, excess > room, excess, fields)
+        self.note_rows(rows, excess > slack, excess, fields)
 
 
 class RoundingNoise(RuleCheck):

@@ -200,8 +200,8 @@ def _of_rule(
     yield from flaws
     if flaws:
         return
-    known = {"severity": _SEVERITIES, "source": tuple(plain.get("sources", {})), "check": tuple(checks)}
-    for key, names in known.items():
+    choices = {"severity": _SEVERITIES, "source": tuple(plain.get("sources", {})), "check": tuple(checks)}
+    for key, names in choices.items():
         if rule.get(key) is not None and rule[key] not in names:
             hint = did_you_mean(str(rule[key]), names) or valid_names(names)
             yield Problem(f"unknown {key} '{rule[key]}'", hint, document.place((*at, key)))

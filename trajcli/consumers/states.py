@@ -47,7 +47,7 @@ class JointNames(_OfFirstRow):
     """Names of joints that are not empty, unique, and those of the robot, none left out."""
 
     def _judge(self, rows: RecordedMotion) -> None:
-        names, known = rows.joints, self.around.joints
+        names, required = rows.joints, self.around.joints
         if names is None:
             self.unjudged = "the file names no joints"
             return
@@ -56,9 +56,9 @@ class JointNames(_OfFirstRow):
                 self._note(rows, joint, f"joint {joint + 1} has no name", None)
             elif name in names[:joint]:
                 self._note(rows, joint, f"the joint '{name}' stands twice", None)
-            elif known is not None and name not in known:
-                self._note(rows, joint, f"the robot has no joint '{name}'", did_you_mean(name, known))
-        for name in known or ():
+            elif required is not None and name not in required:
+                self._note(rows, joint, f"the robot has no joint '{name}'", did_you_mean(name, required))
+        for name in required or ():
             if name not in names:
                 self._note(rows, None, f"the joint '{name}' is missing", "a goal names all joints")
 
@@ -227,8 +227,8 @@ class AtRest(RuleCheck):
 
     def _take(self, rows: RecordedMotion) -> None:
         if self.word("at") == "start":
-            known = rows.q[:0] if self._near is None else self._near
-            self._rows, self._near = self._rows or rows, np.concatenate([known, rows.q[: 3 - len(known)]])
+            before = rows.q[:0] if self._near is None else self._near
+            self._rows, self._near = self._rows or rows, np.concatenate([before, rows.q[: 3 - len(before)]])
             return
         near = rows.q[-3:]
         if self._near is not None and len(near) < 3:

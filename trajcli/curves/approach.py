@@ -191,13 +191,13 @@ def _piece_uses(
     used, times = _largest_ratio(distances, speeds, np.concatenate([ends, fastest]), (d, o))
     level = used.max(axis=0) if at_least is None else np.full(used.shape[1], at_least)
     slowest, nearest = (control_points(each, column) for each in (speeds, distances))
-    room = allowed_speed(nearest.min(axis=0), d, o)
-    near = np.nonzero((slowest.max(axis=0) > level * room) & (used > 0.0) & (used < _HOPELESS))
+    allowed = allowed_speed(nearest.min(axis=0), d, o)
+    near = np.nonzero((slowest.max(axis=0) > level * allowed) & (used > 0.0) & (used < _HOPELESS))
     if near[0].size:
         rows = distances[:, near[0], near[1]]
-        known = np.maximum(used[near], level[near[1]])
-        raised, when = _raised(rows, lengths[near[0]], (d[near], o[near]), known)
-        better = raised > known
+        at_ends = np.maximum(used[near], level[near[1]])
+        raised, when = _raised(rows, lengths[near[0]], (d[near], o[near]), at_ends)
+        better = raised > at_ends
         used[tuple(index[better] for index in near)] = raised[better]
         times[tuple(index[better] for index in near)] = when[better]
     return used, times
@@ -213,11 +213,11 @@ def _largest_ratio(
     return np.take_along_axis(ratio, best, 0)[0], np.take_along_axis(candidates, best, 0)[0]
 
 
-def _raised(distances: Array, lengths: Array, limit: Sequence[Array], known: Array) -> tuple[Array, Array]:
-    """Return the uses (a,) of single pieces, raised from those `known`, and when they are."""
+def _raised(distances: Array, lengths: Array, limit: Sequence[Array], at_ends: Array) -> tuple[Array, Array]:
+    """Return the uses (a,) of single pieces, raised from those `at_ends`, and when they are."""
     crossings = _crossings(distances, lengths, limit)
     ratio, times = _largest_ratio(distances, -derivative_coefficients(distances, 1), crossings, limit)
-    used = np.maximum(known, ratio)
+    used = np.maximum(at_ends, ratio)
     live = np.flatnonzero(used < _HOPELESS)
     if not live.size:
         return used, times

@@ -43,13 +43,13 @@ def braking(velocity: float, acceleration: float, bounds: Array) -> Braking:
         bounds: Shape (3, 2), lower and upper, of velocity, acceleration and jerk. Of the two bounds of the
             jerk the smaller magnitude holds both ways.
     """
-    (low, high), (least, most), jerks = bounds.tolist()
+    (low, high), (lowest, highest), jerks = bounds.tolist()
     jerk = min(map(abs, jerks))
     start = (velocity, acceleration if math.isfinite(jerk) else 0.0)
     reached = start[0] + start[1] * abs(start[1]) / (2 * jerk)
     over, under = _above(reached, high), _above(-reached, -low)
     if not over and (under or _above(-velocity, -low)):
-        turned = _descent(-start[0], -start[1], (-high, -low), (-most, -least), jerk)
+        turned = _descent(-start[0], -start[1], (-high, -low), (-highest, -lowest), jerk)
         return Braking(
             tuple((time, -constant) for time, constant in turned.phases),
             turned.velocity,
@@ -57,8 +57,8 @@ def braking(velocity: float, acceleration: float, bounds: Array) -> Braking:
             -turned.fastest,
         )
     if over or _above(velocity, high):
-        return _descent(*start, (low, high), (least, most), jerk)
-    outside = max(start[1] - most, least - start[1])
+        return _descent(*start, (low, high), (lowest, highest), jerk)
+    outside = max(start[1] - highest, lowest - start[1])
     if outside <= _ROUNDING * abs(start[1]):
         return Braking((), 0.0, 0.0, velocity)
     return Braking(((outside / jerk, -math.copysign(jerk, start[1])),), 0.0, outside / jerk, velocity)
@@ -73,14 +73,14 @@ def _descent(
     velocity: float, acceleration: float, speeds: tuple[float, float], rates: tuple[float, float], jerk: float
 ) -> Braking:
     """Return the braking of a velocity above its bounds, or carried there; bounds (low, high)."""
-    (low, high), (least, most) = speeds, rates
+    (low, high), (lowest, highest) = speeds, rates
     if math.isinf(jerk):
-        time = (velocity - high) / -least
-        return Braking(((time, least),) if time > 0 else (), time, 0.0, velocity)
+        time = (velocity - high) / -lowest
+        return Braking(((time, lowest),) if time > 0 else (), time, 0.0, velocity)
     fastest = velocity + max(acceleration, 0.0) ** 2 / (2 * jerk)
-    beyond = max(acceleration - most, least - acceleration, 0.0)
+    beyond = max(acceleration - highest, lowest - acceleration, 0.0)
     # down to the acceleration from which full jerk the other way just ends at the lower bound
-    turn = max(least, -math.sqrt(max(jerk * (velocity - low) + acceleration**2 / 2, 0.0)))
+    turn = max(lowest, -math.sqrt(max(jerk * (velocity - low) + acceleration**2 / 2, 0.0)))
     first = -math.copysign(jerk, acceleration - turn)
     plan = [(abs(acceleration - turn) / jerk, first)]
     speed = velocity + (turn**2 - acceleration**2) / (2 * first)

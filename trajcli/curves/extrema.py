@@ -415,10 +415,10 @@ def _within(
 
 def _extremes(ends: Array, within: _Within, windows: _Windows) -> Peaks:
     """Return extremes, arrays of shape (m, n), from values at ends (2, w, n) and within."""
-    pairs, least, most = within.pairs, ends.min(axis=0), ends.max(axis=0)
-    least[pairs] = np.minimum(least[pairs], within.values.min(axis=0, initial=np.inf))
-    most[pairs] = np.maximum(most[pairs], within.values.max(axis=0, initial=-np.inf))
-    low, high = np.minimum.reduceat(least, windows.first), np.maximum.reduceat(most, windows.first)
+    pairs, lowest, highest = within.pairs, ends.min(axis=0), ends.max(axis=0)
+    lowest[pairs] = np.minimum(lowest[pairs], within.values.min(axis=0, initial=np.inf))
+    highest[pairs] = np.maximum(highest[pairs], within.values.max(axis=0, initial=-np.inf))
+    low, high = np.minimum.reduceat(lowest, windows.first), np.maximum.reduceat(highest, windows.first)
     same = _SAME * np.maximum(np.abs(low), np.abs(high))
     below, above = (low + same)[windows.interval], (high - same)[windows.interval]
     low_time = _earliest(ends <= below, within.values <= below[pairs], within, windows)

@@ -86,7 +86,7 @@ def fit(
     breaks: Array,
     guess: Guess,
     *,
-    most: int | None = None,
+    at_most: int | None = None,
 ) -> PiecewisePolynomial:
     """Return quintic pieces through a function, each within tolerance where its error is largest.
 
@@ -97,12 +97,12 @@ def fit(
         misfit: Its tolerance.
         breaks: Shape (m,), increasing: where the second derivative may jump, and the ends.
         guess: Values (N, n) near the function's at points (N,), to begin with.
-        most: Pieces; None for as many as `most_pieces` allows.
+        at_most: Pieces; None for as many as `most_pieces` allows.
 
     Raises:
         FitError: When more pieces would be needed.
     """
-    most = most_pieces(breaks) if most is None else most
+    at_most = most_pieces(breaks) if at_most is None else at_most
     pending = _whole(exact, breaks, guess)
     done: list[_Pieces] = []
     count = 0
@@ -115,7 +115,7 @@ def fit(
             return _joined(done)
         pieces = count + int(np.count_nonzero(~fine))
         parts = _parts(judged.error[~fine], judged.least[~fine], _AT_ONCE // pieces)
-        if count + int(parts.sum()) > most:
+        if count + int(parts.sum()) > at_most:
             break
         pending = _divided(judged.pieces.at(~fine), parts, judged.nearer[~fine], guess)
     worst = int(judged.error.argmax())
@@ -199,12 +199,12 @@ def _judged(exact: ExactValues[K], misfit: ErrorMeasure[K], pending: _Pending) -
     """Return the pieces with their misfits; ends and probes are asked for at once: a question costs more."""
     pieces, inner = pending.pieces, pending.lefts.size
     probes = pieces.probes()
-    known = exact(np.append(pieces.start[pending.lefts], probes), "right", pending.guess)
-    pieces.left[:, pending.lefts] = known.values[:, :inner]
-    pieces.right[:, pending.rights] = known.values[:, : pending.rights.size]
+    exact_states = exact(np.append(pieces.start[pending.lefts], probes), "right", pending.guess)
+    pieces.left[:, pending.lefts] = exact_states.values[:, :inner]
+    pieces.right[:, pending.rights] = exact_states.values[:, : pending.rights.size]
     lengths = pieces.end - pieces.start
-    fitted, values = _at(pieces.coefficients(), lengths[:, None] * _PROBES), known.values[:, inner:]
-    errors = misfit(known, inner + np.arange(probes.size), fitted).reshape(-1, _PROBES.size)
+    fitted, values = _at(pieces.coefficients(), lengths[:, None] * _PROBES), exact_states.values[:, inner:]
+    errors = misfit(exact_states, inner + np.arange(probes.size), fitted).reshape(-1, _PROBES.size)
     errors = np.where(np.isfinite(errors), errors, np.inf)
     worst = np.arange(lengths.size) * _PROBES.size + errors.argmax(axis=1)
     error = errors.reshape(-1)[worst]
@@ -213,7 +213,7 @@ def _judged(exact: ExactValues[K], misfit: ErrorMeasure[K], pending: _Pending) -
     rows = np.flatnonzero((error > _FILLED) & near.any(axis=0))
     if rows.size:
         there = worst[rows]
-        explained = misfit(known, inner + there, values[:, there] + rounding[:, rows])
+        explained = misfit(exact_states, inner + there, values[:, there] + rounding[:, rows])
         error[rows[error[rows] <= explained]] = 0.0
     off = [
         np.abs(near - values[0]).max(axis=1).reshape(errors.shape).max(axis=1)
@@ -225,8 +225,8 @@ def _judged(exact: ExactValues[K], misfit: ErrorMeasure[K], pending: _Pending) -
 def _parts(error: Array, least: Array, at_once: int) -> RowIndices:
     """Return into how many parts pieces of a largest and a smallest misfit (k,) are divided."""
     wanted, everywhere = (np.ceil(1.1 * size ** (1 / _ORDER)) for size in (error, least))
-    most = np.maximum(_MOST_PARTS, np.minimum(everywhere, at_once))
-    return np.clip(wanted, 2, most).astype(int)
+    many = np.maximum(_MOST_PARTS, np.minimum(everywhere, at_once))
+    return np.clip(wanted, 2, many).astype(int)
 
 
 def _rounding(values: Array, lengths: Array) -> Array:

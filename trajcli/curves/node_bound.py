@@ -41,13 +41,13 @@ class BoundedPeak:
     Attributes:
         value: The largest one sampled.
         time: Where that is.
-        most: What it does not exceed at any time.
+        upper_bound: What it does not exceed at any time.
         entries: Of the function there, shape (d,).
     """
 
     value: float
     time: float
-    most: float
+    upper_bound: float
     entries: Array
 
 
@@ -89,7 +89,7 @@ class NodeSurvey:
             self.starts,
             self.lengths,
         )
-        value, time, most = least, float(starts.min()), least
+        value, time, upper_bound = least, float(starts.min()), least
         if not (np.isfinite(values).all() and np.isfinite(remainder).all()):
             nothing = np.append(np.inf, np.zeros(values.shape[-1] - 1))
             return BoundedPeak(np.inf, time, np.inf, nothing)  # nothing is proven of what no float64 holds
@@ -106,15 +106,15 @@ class NodeSurvey:
             wide = highest > value + slack(value)
             if not wide.any() or len(points) > _MOST_PARTS or division == _DIVISIONS:
                 break
-            most = max(most, float((highest + remainder)[~wide].max(initial=least)))
+            upper_bound = max(upper_bound, float((highest + remainder)[~wide].max(initial=least)))
             points = (halves[:, None] @ points[wide]).reshape(-1, *points.shape[1:])
             remainder, lengths = np.tile(remainder[wide], 2), np.tile(lengths[wide] / 2, 2)
             starts = np.concatenate([starts[wide], starts[wide] + lengths[: len(lengths) // 2]])
-        return BoundedPeak(value, time, max(most, float((highest + remainder).max())), entries)
+        return BoundedPeak(value, time, max(upper_bound, float((highest + remainder).max())), entries)
 
 
 def node_survey(
-    known: KnownAtNodes,
+    values_at_nodes: KnownAtNodes,
     pieces: tuple[Array, Array, Array],
     slack: Callable[[Array], Array],
     halvings: int,
@@ -122,13 +122,13 @@ def node_survey(
     """Return the values at nodes of pieces, halved until the remainders are small enough.
 
     Args:
-        known: Values and majorants on pieces.
+        values_at_nodes: Values and majorants on pieces.
         pieces: Starts and lengths above 0, each (P,), and coefficients (degree + 1, P, n) from the starts on.
         slack: From values (P, 9, m, d) to the largest remainders that are small enough, shape (m,).
         halvings: How many times at most.
     """
     starts, lengths, coefficients = pieces
-    found = _surveyed(known, starts, lengths, coefficients)
+    found = _surveyed(values_at_nodes, starts, lengths, coefficients)
     for _ in range(halvings):
         coarse = (found.remainder > slack(found.values)).any(axis=1)
         coarse &= np.isfinite(found.remainder).all(axis=1)
@@ -137,7 +137,7 @@ def node_survey(
         half, early = found.lengths[coarse] / 2, coefficients[:, coarse]
         late = taylor_shift(early, np.broadcast_to(half[:, None], early.shape[1:]))
         both, begins = np.concatenate([early, late], axis=1), found.starts[coarse]
-        more = _surveyed(known, np.concatenate([begins, begins + half]), np.tile(half, 2), both)
+        more = _surveyed(values_at_nodes, np.concatenate([begins, begins + half]), np.tile(half, 2), both)
         coefficients = np.concatenate([coefficients[:, ~coarse], both], axis=1)
         found = NodeSurvey(
             np.concatenate([found.starts[~coarse], more.starts]),
@@ -148,8 +148,10 @@ def node_survey(
     return found
 
 
-def _surveyed(known: KnownAtNodes, starts: Array, lengths: Array, coefficients: Array) -> NodeSurvey:
-    values, majorants = known(coefficients, lengths)
+def _surveyed(
+    values_at_nodes: KnownAtNodes, starts: Array, lengths: Array, coefficients: Array
+) -> NodeSurvey:
+    values, majorants = values_at_nodes(coefficients, lengths)
     remainder = majorants * BETWEEN_NODES * lengths[:, None] ** (NODES_DEGREE + 1)
     return NodeSurvey(starts, lengths, values, remainder)
 

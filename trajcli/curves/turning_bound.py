@@ -79,14 +79,14 @@ class MonotoneStretches:
     def least_times(self) -> Array:
         """Return the least time of each, shape (k,)."""
         low, high = self.speeds.max(axis=0), np.maximum(self.limit, self.speeds.max(axis=0))
-        known = self._covered(low)[0] <= self.distance  # else nothing is said of how it stops
+        covered = self._covered(low)[0] <= self.distance  # else nothing is said of how it stops
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
             fits = self._covered(middle)[0] <= self.distance
             low, high = np.where(fits, middle, low), np.where(fits, high, middle)
         length, time = self._covered(low)
-        rest = np.maximum(self.distance - length, 0.0) / np.maximum(high, low)
-        least = np.where(known, time + rest, self.distance / self.limit)
+        remainder = np.maximum(self.distance - length, 0.0) / np.maximum(high, low)
+        least = np.where(covered, time + remainder, self.distance / self.limit)
         return np.asarray(least * (1.0 - _ROUNDING))
 
     def _covered(self, peak: Array) -> tuple[Array, Array]:

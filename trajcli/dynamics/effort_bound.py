@@ -39,13 +39,13 @@ class EffortPeak:
     Attributes:
         value: The largest one sampled, N m or N.
         time: Where that is, s.
-        most: What it does not exceed at any time.
+        upper_bound: What it does not exceed at any time.
         parts: What it consists of: M qdd + C qd, viscous friction, Coulomb friction, gravity.
     """
 
     value: float
     time: float
-    most: float
+    upper_bound: float
     parts: tuple[float, float, float, float]
 
     @property
@@ -73,20 +73,20 @@ class EffortSurvey:
     nodes: NodeSurvey
     limits: Array
 
-    def doubtful(self, limits: Array, room: float) -> Iterator[tuple[int, int, float]]:
+    def doubtful(self, limits: Array, slack: float) -> Iterator[tuple[int, int, float]]:
         """Yield index, direction and magnitude of the limits that a first look at the hull does not prove.
 
         Args:
             limits: Lower and upper bounds, shape (n, 2).
-            room: By what part of a limit it may be passed.
+            slack: By what part of a limit it may be passed.
         """
         points = np.tensordot(hull_matrices()[0], self.nodes.values.sum(axis=3), axes=(1, 1))
         remainder = self.nodes.remainder
         high = (points.max(axis=0) + remainder).max(axis=0, initial=0.0)
         low = (points.min(axis=0) - remainder).min(axis=0, initial=0.0)
         for joint, (lower, upper) in enumerate(limits.tolist()):
-            for sign, most, limit in ((1, high[joint], upper), (-1, -low[joint], -lower)):
-                if not most <= limit * (1.0 + room):
+            for sign, upper_bound, limit in ((1, high[joint], upper), (-1, -low[joint], -lower)):
+                if not upper_bound <= limit * (1.0 + slack):
                     yield joint, sign, limit
 
     def highest(self, stretch: float = 1.0) -> list[EffortPeak]:
@@ -117,7 +117,7 @@ class EffortSurvey:
         found = weighted.largest(joint, _sum, lambda _: slack)
         dynamic, viscous, coulomb, gravity = found.entries.tolist()
         time = min(max(found.time, self.span[0]), self.span[1])
-        return EffortPeak(found.value, time, found.most, (dynamic, viscous, coulomb, gravity))
+        return EffortPeak(found.value, time, found.upper_bound, (dynamic, viscous, coulomb, gravity))
 
 
 @frozen
@@ -134,7 +134,7 @@ class EffortStretch:
     peak: EffortPeak
 
 
-def needed_stretch(survey: EffortSurvey, joint: int, sign: int, limit: float, room: float) -> EffortStretch:
+def needed_stretch(survey: EffortSurvey, joint: int, sign: int, limit: float, slack: float) -> EffortStretch:
     """Return the smallest stretch with which one joint keeps its limit in one direction.
 
     Gravity g and Coulomb friction stay, what inertia takes shrinks with the square of the stretch k and
@@ -146,14 +146,14 @@ def needed_stretch(survey: EffortSurvey, joint: int, sign: int, limit: float, ro
         joint: Index.
         sign: 1 for upwards, -1 for downwards.
         limit: Above 0, N m or N.
-        room: By what part of the limit it may be passed by what is proven.
+        slack: By what part of the limit it may be passed by what is proven.
 
     Source: Dinkelbach, On nonlinear fractional programming, Management Science 13 (1967).
     """
     factor = 1.0
     for _ in range(_STEPS):
         peak = survey.peak(joint, sign, factor)
-        if peak.most <= limit * (1.0 + room):
+        if peak.upper_bound <= limit * (1.0 + slack):
             return EffortStretch(factor, peak)
         free = limit - peak.static
         inertial, viscous = peak.parts[0] * factor**2, peak.parts[1] * factor
@@ -163,7 +163,7 @@ def needed_stretch(survey: EffortSurvey, joint: int, sign: int, limit: float, ro
         if root < 0.0 or viscous + root**0.5 <= 0.0:
             break
         wanted = (viscous + root**0.5) / (2.0 * free)
-        factor = max(wanted, factor * (1.0 + max(0.5 * room, _LEAST)))
+        factor = max(wanted, factor * (1.0 + max(0.5 * slack, _LEAST)))
     return EffortStretch(np.inf, peak)
 
 
@@ -187,7 +187,7 @@ def effort_survey(
     starts, lengths = breaks[:-1][long], np.diff(breaks)[long]
     least = np.full(len(dynamics.links), np.inf) if limits is None else np.abs(limits).min(axis=1)
     nodes = node_survey(
-        lambda coefficients, lengths: _known(dynamics, coefficients, lengths),
+        lambda coefficients, lengths: _values_at_nodes(dynamics, coefficients, lengths),
         cut_where_joints_turn(dynamics, starts, lengths, coefficients[:, long], still),
         lambda values: _slack(values, least),
         _HALVINGS,
@@ -205,7 +205,7 @@ def _slack(values: Array, limits: Array) -> Array:
     return np.asarray(_CLOSE * np.maximum(np.minimum(largest, limits), _SMALL))
 
 
-def _known(dynamics: InverseDynamics, coefficients: Array, lengths: Array) -> tuple[Array, Array]:
+def _values_at_nodes(dynamics: InverseDynamics, coefficients: Array, lengths: Array) -> tuple[Array, Array]:
     """Return the parts of efforts at the nodes (P, 9, n, 4), and majorants of the ninth order (P, n)."""
     q, qd, qdd = at_nodes(coefficients, lengths)
     parts = np.empty((*q.shape, _PARTS))

@@ -99,7 +99,7 @@ class EffortConstraint:
         object.__setattr__(self, "_memory", _PathDynamics(self.dynamics))
 
     @property
-    def _known(self) -> _PathDynamics:
+    def _path_dynamics(self) -> _PathDynamics:
         memory: _PathDynamics = self.__dict__["_memory"]
         return memory
 
@@ -120,16 +120,16 @@ class EffortConstraint:
             HeldOverLimitError: When gravity and friction alone take a joint to its limit at one of them.
         """
         q, first, second = self.path.evaluate_orders(s, (0, 1, 2), side=side).transpose(1, 0, 2)
-        a, b, held = self._known.at(s, q, first, second)
+        a, b, held = self._path_dynamics.at(s, q, first, second)
         held = held + self._coulomb * np.sign(first)
         upper, lower = self._bounded
-        rooms = np.concatenate(
+        slacks = np.concatenate(
             [self.limits[upper, 1] - held[:, upper], held[:, lower] - self.limits[lower, 0]], 1
         )
-        self._require_room(s, held, rooms)
-        a, b, rub = (self._both_bounds(values) for values in (a, b, self._viscous * first))
-        slopes, offsets = self._viscous_rows(s, first, rub, rooms)
-        return ConstraintRows(a, b + slopes, rooms - offsets, np.full(s.size, np.inf))
+        self._require_slack(s, held, slacks)
+        a, b, friction = (self._both_bounds(values) for values in (a, b, self._viscous * first))
+        slopes, offsets = self._viscous_rows(s, first, friction, slacks)
+        return ConstraintRows(a, b + slopes, slacks - offsets, np.full(s.size, np.inf))
 
     def largest(self, s: Array, side: Side) -> Array:
         """Return no bound at points (p,): sdd may be anything."""
@@ -148,14 +148,14 @@ class EffortConstraint:
         begins = law.coefficients[-1]
         states = self.path.evaluate_orders(begins, (0, 1, 2), side="right").transpose(1, 0, 2)
         # where the limit is met the share is 1 whatever gravity is taken to be: that of the near end is known
-        gravity = self._known.at(begins, *states)[2]
+        gravity = self._path_dynamics.at(begins, *states)[2]
         moving = self.dynamics.rigid_effort(position, rate, change) - gravity + self._viscous * rate
-        rooms = self._rooms(
+        slacks = self._slacks(
             gravity + self._coulomb * direction(rate[1])
         )  # at rest at an end it is that of the motion
         used = self._both_bounds(moving)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            shares = np.where(rooms > 0, used / rooms, np.where(used > rooms, _MOST, 0.0))
+            shares = np.where(slacks > 0, used / slacks, np.where(used > slacks, _MOST, 0.0))
         worst = np.clip(shares.max(axis=(0, 2), initial=0.0), 0.0, _MOST)
         return np.stack([np.zeros_like(worst), worst])
 
@@ -177,33 +177,33 @@ class EffortConstraint:
         upper, lower = self._bounded
         return np.concatenate([values[..., upper], -values[..., lower]], axis=-1)
 
-    def _rooms(self, held: Array) -> Array:
+    def _slacks(self, held: Array) -> Array:
         """Return what the limits leave in each row where joints are held with efforts (..., n)."""
         upper, lower = self._bounded
         limits = np.concatenate([self.limits[upper, 1], -self.limits[lower, 0]])
         return np.asarray(limits - self._both_bounds(held))
 
-    def _require_room(self, s: Array, held: Array, rooms: Array) -> None:
-        if (rooms > 0).all():
+    def _require_slack(self, s: Array, held: Array, slacks: Array) -> None:
+        if (slacks > 0).all():
             return
-        point, row = np.unravel_index(int(rooms.argmin()), rooms.shape)
+        point, row = np.unravel_index(int(slacks.argmin()), slacks.shape)
         upper, lower = map(np.flatnonzero, self._bounded)
         side = int(row < upper.size)
         joint = int(upper[row] if side else lower[row - upper.size])
         effort, limit = float(held[point, joint]), float(self.limits[joint, side])
         raise HeldOverLimitError(joint, float(s[point]), effort, limit)
 
-    def _viscous_rows(self, s: Array, first: Array, rub: Array, rooms: Array) -> tuple[Array, Array]:
-        """Return what viscous friction adds to b, and takes of c, in rows (p, k) of `rub` = v q'."""
+    def _viscous_rows(self, s: Array, first: Array, friction: Array, slacks: Array) -> tuple[Array, Array]:
+        """Return what viscous friction adds to b, and takes of c, in rows (p, k) of `friction` = v q'."""
         if not self.has_viscous:
-            return np.zeros_like(rub), np.zeros_like(rub)
+            return np.zeros_like(friction), np.zeros_like(friction)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             rate = np.maximum(first / self.velocity[:, 1], first / self.velocity[:, 0]).max(axis=1)
             cap = np.where(rate > 0, 1.0 / rate, np.inf)
             near = cap if self.speed is None else self.speed(s)
-            largest = _SHARE * 2.0 * rooms / rub  # beyond it the tangent would leave nothing at rest
+            largest = _SHARE * 2.0 * slacks / friction  # beyond it the tangent would leave nothing at rest
         near = np.where(np.isfinite(near), near, 1.0)
         near = np.maximum(near, _SLOWEST * near.max(initial=0.0) + 1e-12)
-        touch = np.where(rub > 0, np.minimum(near[:, None], largest), 1.0)
-        slopes = np.where(rub > 0, rub / (2.0 * touch), rub / cap[:, None])
-        return slopes, np.where(rub > 0, rub * touch / 2.0, 0.0)
+        touch = np.where(friction > 0, np.minimum(near[:, None], largest), 1.0)
+        slopes = np.where(friction > 0, friction / (2.0 * touch), friction / cap[:, None])
+        return slopes, np.where(friction > 0, friction * touch / 2.0, 0.0)

@@ -108,18 +108,18 @@ def requirements_of(
     """
     if robot is None:
         shape = np.shape(q)
-        known = _bare(int(shape[-1]) if shape else 0)
+        bare = _bare(int(shape[-1]) if shape else 0)
     elif isinstance(robot, Robot):
-        known = robot
+        bare = robot
     else:
-        known = _read(str(robot), _changed(str(robot)))
+        bare = _read(str(robot), _changed(str(robot)))
     if isinstance(limits, Limits):
         from dataclasses import replace
 
-        known = replace(known, limits=limits)
+        bare = replace(bare, limits=limits)
     elif limits is not None:
-        known = _limited(_Held(known), _Held(limits, repr(limits)))
-    return Requirements(known, interpolate=interpolate, tool=_tool_of(_Held(known)))
+        bare = _limited(_Held(bare), _Held(limits, repr(limits)))
+    return Requirements(bare, interpolate=interpolate, tool=_tool_of(_Held(bare)))
 
 
 class _Held:

@@ -44,14 +44,14 @@ class Changes:
         change: Value at the end minus value at the start, shape (P, n).
         error: By how much it may be off by rounding, shape (P, n).
         stated: What the columns of the next derivative say that it is; None where there are none.
-        room: By how much the latter may be off by rounding and by what happens between rows.
+        slack: By how much the latter may be off by rounding and by what happens between rows.
     """
 
     order: int
     change: Array
     error: Array
     stated: Array | None
-    room: Array | None
+    slack: Array | None
 
     def disagree(self, lengths: Array, limits: Limits) -> NDArray[np.bool_]:
         """Return where the columns of two derivatives exclude each other, shape (P, n).
@@ -62,18 +62,18 @@ class Changes:
             lengths: Of the intervals, s, shape (P,).
             limits: In force.
         """
-        if self.stated is None or self.room is None:
+        if self.stated is None or self.slack is None:
             return np.zeros(self.change.shape, dtype=bool)
         sizes = np.abs(self.change) + np.abs(self.stated)
-        room = self.room + self.error + JUMP_ABSOLUTE + JUMP_RELATIVE * sizes
+        slack = self.slack + self.error + JUMP_ABSOLUTE + JUMP_RELATIVE * sizes
         sparse = lengths > DENSE
         if sparse.any():
             further = np.abs(limits.of_order(self.order + 2)).max(axis=1) * lengths[sparse, None] ** 2 / 4.0
             if self.order == 1:  # the acceleration may also step from one limit to the other
                 steps = 2.0 * np.abs(limits.acceleration).max(axis=1) * lengths[sparse, None]
                 further = np.minimum(further, steps)
-            room[sparse] += further
-        return np.asarray(np.abs(self.change - self.stated) > room)
+            slack[sparse] += further
+        return np.asarray(np.abs(self.change - self.stated) > slack)
 
     def persistent(self, disagree: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return where columns exclude each other in most of the intervals around that are not still, (P, n).
@@ -83,8 +83,8 @@ class Changes:
         if self.order == 0 or self.stated is None or not disagree.any():
             return disagree
         moving = np.abs(self.change) + np.abs(self.stated) > self.error + JUMP_ABSOLUTE
-        wrong, known = (_around(flags) for flags in (disagree, moving))
-        return np.asarray(disagree & (2 * wrong > np.maximum(known, _FEWEST)))
+        wrong, judged = (_around(flags) for flags in (disagree, moving))
+        return np.asarray(disagree & (2 * wrong > np.maximum(judged, _FEWEST)))
 
     def isolated(self, piece: NDArray[np.intp], joint: NDArray[np.intp], values: Array) -> NDArray[np.bool_]:
         """Return which of some values (P, n) are much larger than those near to them, but for one beside."""
@@ -99,28 +99,28 @@ def changes_of(window: Intervals) -> list[Changes]:
     """Return how positions, velocities and accelerations change, as far as the rows have them."""
     q, qd, qdd = window.states
     resolution, length, late = window.resolution, window.lengths[:, None], window.late[:, None]
-    known = [(q, resolution.q), (qd, resolution.qd), (qdd, resolution.qdd)]
+    rows_and_roundings = [(q, resolution.q), (qd, resolution.qd), (qdd, resolution.qdd)]
     found = []
-    for order, (values, rounding) in enumerate(known):
+    for order, (values, rounding) in enumerate(rows_and_roundings):
         if values is None:
             continue
         off = stated_errors(values, np.asarray(rounding), resolution.relative)
         change, error = np.diff(values, axis=0), off[:-1] + off[1:]
-        stated = room = None
-        rates = known[order + 1][0] if order < 2 else None
+        stated = slack = None
+        rates = rows_and_roundings[order + 1][0] if order < 2 else None
         if rates is not None:
-            off = stated_errors(rates, np.asarray(known[order + 1][1]), resolution.relative)
+            off = stated_errors(rates, np.asarray(rows_and_roundings[order + 1][1]), resolution.relative)
             mean = 0.5 * (rates[:-1] + rates[1:])
             stated = length * mean
             turns = np.diff(rates, axis=0) / (length if order == 0 else 1.0)
             bend = np.abs(np.diff(turns, axis=0, prepend=0.0, append=0.0))
             padded = np.concatenate([bend[:1], bend, bend[-1:]])
             near = np.max([padded[k : k + len(change)] for k in range(4)], axis=0)
-            room = _STEPS * length ** (2 if order == 0 else 1) * near
+            slack = _STEPS * length ** (2 if order == 0 else 1) * near
             largest = np.abs(rates).max(axis=0)
             meant = _MEANT * largest + _MEANT_OF_ALL * largest.max()
-            room = room + 0.5 * length * (off[:-1] + off[1:]) + late * np.abs(mean) + length * meant
-        found.append(Changes(order, change, error, stated, room))
+            slack = slack + 0.5 * length * (off[:-1] + off[1:]) + late * np.abs(mean) + length * meant
+        found.append(Changes(order, change, error, stated, slack))
     return found
 
 
@@ -182,9 +182,9 @@ class _Judge:
         if not np.isfinite(bounds).any():
             return np.zeros(self.changes.change.shape, dtype=bool)
         longest = (self.window.lengths + self.window.late)[:, None]
-        change, room = self.changes.change, self.changes.error
-        return exceeds(change - room, bounds[:, 1] * longest) | exceeds(
-            -change - room, -bounds[:, 0] * longest
+        change, slack = self.changes.change, self.changes.error
+        return exceeds(change - slack, bounds[:, 1] * longest) | exceeds(
+            -change - slack, -bounds[:, 0] * longest
         )
 
     def add(
@@ -237,8 +237,8 @@ class _Judge:
         time = float(self.window.t[row])
         text = f"the {_QUANTITIES[order]} of {{joint}} jumps by {{value}} {at_time(time)}"
         rounding = float(changes.error[row, joint])
-        if stated is not None and changes.room is not None:
-            rounding += float(changes.room[row, joint])
+        if stated is not None and changes.slack is not None:
+            rounding += float(changes.slack[row, joint])
         if kind == "branch":
             text = (
                 f"{{joint}} jumps by {{value}} {at_time(time)}, the tool does not: the arm changes its branch"

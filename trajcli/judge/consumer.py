@@ -30,8 +30,8 @@ class ConsumerJudge:
             InputError: When there is no such profile.
         """
         self.profile: Profile = load_profile(profile)
-        known = (None, None) if robot is None else (robot.joint_names, robot.limits)
-        self._checks = checks_of(self.profile, Surroundings(known[0], start, known[1]))
+        of_robot = (None, None) if robot is None else (robot.joint_names, robot.limits)
+        self._checks = checks_of(self.profile, Surroundings(of_robot[0], start, of_robot[1]))
 
     def take(self, rows: RecordedMotion) -> None:
         """Judge the next rows."""

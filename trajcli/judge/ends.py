@@ -57,8 +57,8 @@ def judge_end(
         axes: The joints.
     """
     if end is None or tolerance is None:
-        rest = np.zeros(len(axes.joint_names))
-        return _rate(row, rest, 1, resolution, axes, ("end", "warning"))
+        standing = np.zeros(len(axes.joint_names))
+        return _rate(row, standing, 1, resolution, axes, ("end", "warning"))
     return [
         *_position(row, end.position, tolerance, resolution, axes, "end"),
         *_rate(row, end.velocity, 1, resolution, axes, ("end", "error")),
@@ -79,9 +79,9 @@ def _position(
     time, number, (q, *_) = row
     if q is None:
         return []
-    room = stated_errors(q, resolution.q, resolution.relative)[0]
+    slack = stated_errors(q, resolution.q, resolution.relative)[0]
     over = np.abs(q[0] - wanted) - tolerance
-    joint = int(np.where(over > 0, over - room, -np.inf).argmax())  # roundings differ by joint
+    joint = int(np.where(over > 0, over - slack, -np.inf).argmax())  # roundings differ by joint
     if over[joint] <= 0:
         return []
     value, limit = float(q[0, joint]), float(wanted[joint])
@@ -105,8 +105,8 @@ def _position(
             row=number,
             count=int((over > 0).sum()),
             quantity="position",
-            certainty="exceeded" if over[joint] > room[joint] else "within rounding",
-            rounding=float(room[joint]),
+            certainty="exceeded" if over[joint] > slack[joint] else "within rounding",
+            rounding=float(slack[joint]),
             message=f"the {which} row has {{joint}} at {{value}} {at_time(time)}, expected {{limit}} "
             "within {tolerance}",
             amounts={**excess_amounts(axes, joint, 0, value, limit), "tolerance": within},
@@ -129,10 +129,10 @@ def _rate(
         return []
     rounding = (resolution.qd, resolution.qdd)[order - 1]
     said = np.isfinite(wanted)
-    room = stated_errors(rates, rounding, resolution.relative)[0] + _REST
+    slack = stated_errors(rates, rounding, resolution.relative)[0] + _REST
     over = np.where(said, np.abs(rates[0] - wanted), 0.0)
-    joint = int((over - room).argmax())
-    if over[joint] <= room[joint]:
+    joint = int((over - slack).argmax())
+    if over[joint] <= slack[joint]:
         return []
     value, limit = float(rates[0, joint]), float(wanted[joint])
     kind, severity = end
@@ -148,9 +148,9 @@ def _rate(
             limit=limit,
             time=time,
             row=number,
-            count=int((over > room).sum()),
+            count=int((over > slack).sum()),
             quantity=what,
-            rounding=float(room[joint]),
+            rounding=float(slack[joint]),
             message=f"the {which} row has {'an' if order > 1 else 'a'} {what} of {{joint}} of {{value}} "
             f"{at_time(time)}, expected {{limit}}",
             amounts=excess_amounts(axes, joint, order, value, limit),
@@ -184,15 +184,15 @@ def judge_order_of_stamps(
         if np.isfinite(time):
             how = "doubled" if time == last else "earlier than the one before"
             text = f"the time stamp of row {number}, {time:.9g} s, is {how}: the latest is {last:.9g} s"
-        known = (time, last) if np.isfinite(time) else (None, None)
+        value_and_limit = (time, last) if np.isfinite(time) else (None, None)
         return Finding(
             rule="time",
             severity="error",
             kind="time",
             joint=None,
-            value=known[0],
-            limit=known[1],
-            time=known[0],
+            value=value_and_limit[0],
+            limit=value_and_limit[1],
+            time=value_and_limit[0],
             row=number,
             message=text,
             hint="time stamps must strictly increase",

@@ -139,8 +139,8 @@ def check_file(
     of_tool, read = _of_tool_columns(opened, options, given, motion, by_time, planned=requirements.planned)
     judgement = replace(judgement, findings=worst_first([*judgement.findings, *of_tool]))
     unread = note_of_unread([name for name in motion.unread if name not in read])
-    known = [note for note in motion.notes if note not in note_of_unread(motion.unread)]
-    notes = (*known, *unread, *given.notes, *judgement.notes)
+    of_motion = [note for note in motion.notes if note not in note_of_unread(motion.unread)]
+    notes = (*of_motion, *unread, *given.notes, *judgement.notes)
     if given.loaded is not None and "move" not in motion.quantities and by_time is None:
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
@@ -344,8 +344,8 @@ def _conceded(loaded: LoadedJob) -> tuple[str, ...]:
 def _shown_units(options: CheckOptions, given: _Given) -> Units:
     from trajcli.queries.arm import parse_units
 
-    known = given.shown or given.units
-    return known if options.units is None else parse_units(options.units, known)
+    units = given.shown or given.units
+    return units if options.units is None else parse_units(options.units, units)
 
 
 def _carrying(given: _Given, options: CheckOptions) -> _Given:

@@ -70,9 +70,9 @@ class Intervals:
     @cached_property
     def highest(self) -> NDArray[np.intp]:
         """Order of the highest derivative that each piece determines, shape (N - 1,)."""
-        known = HIGHEST.get(self.interpolation)
-        if known is not None:
-            return np.full(self.lengths.size, known)
+        order = HIGHEST.get(self.interpolation)
+        if order is not None:
+            return np.full(self.lengths.size, order)
         q, qd, qdd = self.states
         counts = stated_orders(np.asarray(q), qd, qdd)
         return np.minimum(counts[:-1], counts[1:])

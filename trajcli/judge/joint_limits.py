@@ -128,15 +128,15 @@ def _judge_derivatives(run: JudgedRun) -> None:
             continue
         least, largest = (points[pieces] for points in window.hulls[order])
         turned = ((1.0, bounds[:, 1], largest), (-1.0, -bounds[:, 0], -least))
-        for sign, bound, most in turned:
-            over = exceeds(most, bound)
+        for sign, bound, upper_bound in turned:
+            over = exceeds(upper_bound, bound)
             if not over.any():
                 continue
             for level in set(highest[over.any(axis=1)].tolist()):
                 side = _Side(window, order, sign, bound, level, pieces.start)
                 alike = over & (highest == level)[:, None]
                 derivative = sign * derivative_coefficients(coefficients, order)
-                offences = side.offences(derivative, alike, most) if order <= level else None
+                offences = side.offences(derivative, alike, upper_bound) if order <= level else None
                 if offences is not None:
                     side.add(offences, run)
 
@@ -161,7 +161,7 @@ class _Side:
     level: int
     first: int
 
-    def offences(self, polynomials: Array, over: NDArray[np.bool_], most: Array) -> _Offences | None:
+    def offences(self, polynomials: Array, over: NDArray[np.bool_], upper_bound: Array) -> _Offences | None:
         """Return the pieces whose polynomials go beyond the bound, from those whose control points do."""
         piece, joint = np.nonzero(over)
         chosen, length = polynomials[:, piece, joint], self.window.lengths[self.first + piece]
@@ -170,9 +170,9 @@ class _Side:
         if len(chosen) > 2:
             near = np.arange(piece.size)
             if piece.size > _MANY:
-                known = np.full(self.bound.size, -np.inf)
-                np.maximum.at(known, joint, value)
-                near = np.flatnonzero(~exceeds(value, bound) | (most[piece, joint] > known[joint]))
+                worst = np.full(self.bound.size, -np.inf)
+                np.maximum.at(worst, joint, value)
+                near = np.flatnonzero(~exceeds(value, bound) | (upper_bound[piece, joint] > worst[joint]))
             for low in range(0, near.size, _MANY):
                 _refine(chosen, length, near[low : low + _MANY], value, local)
         beyond = np.flatnonzero(exceeds(value, bound))
@@ -358,7 +358,7 @@ def _judge_efforts(run: JudgedRun) -> None:
     for joint, bounds in enumerate(limits.tolist()):
         for sign, limit in ((1, bounds[1]), (-1, -bounds[0])):
             peak = survey.peak(joint, sign)
-            if not peak.most <= limit * (1 + EFFORT_RELATIVE):
+            if not peak.upper_bound <= limit * (1 + EFFORT_RELATIVE):
                 over = _OverEffort(run, dynamics, survey, curved, breaks, joint, sign, limit, peak)
                 over.add(float((sign * stated[:, joint]).max()))
 
@@ -414,10 +414,10 @@ class _OverEffort:
             "effort",
             int(run.window.moves[piece]),
             np.array([self.joint]),
-            np.array([peak.most / self.limit]),
+            np.array([peak.upper_bound / self.limit]),
             lambda _: found,
             severity="warning" if warned else "error",
-            certainty="exceeded" if peak.most - self.limit > rounding else "within rounding",
+            certainty="exceeded" if peak.upper_bound - self.limit > rounding else "within rounding",
         )
 
     def _rounding(self, piece: int, local: float) -> float:

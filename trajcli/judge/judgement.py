@@ -75,11 +75,11 @@ class Judgement:
             {**{name: getattr(found, name) for name in _KEYS}, "message": found.text(), "hint": found.hint}
             for found in self.findings
         ]
-        known = {"verdict": self.verdict, "findings": findings, "interpolation": self.interpolation}
+        plain = {"verdict": self.verdict, "findings": findings, "interpolation": self.interpolation}
         period = {} if self.period is None else {"period": self.period}
         planned = {} if self.planned_rows is None else {"planned_rows": self.planned_rows}
         said = {"notes": list(self.notes), "events": list(self.events)}
-        return {**known, "rows": self.rows, **period, **planned, **said}
+        return {**plain, "rows": self.rows, **period, **planned, **said}
 
 
 def worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:

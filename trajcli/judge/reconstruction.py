@@ -83,8 +83,8 @@ def piece_coefficients(
         from trajcli.curves.splines.cubic import clamped
 
         times = np.append(0.0, np.cumsum(lengths))
-        rest = np.zeros(q.shape[1])
-        return clamped(times, q, rest, rest).coefficients
+        standing = np.zeros(q.shape[1])
+        return clamped(times, q, standing, standing).coefficients
     if interpolation == "jtc":
         return _by_segment(lengths, q, qd, qdd)
     stated = [rows for rows in (q, qd, qdd)[: _STATED[interpolation]] if rows is not None]
@@ -102,11 +102,11 @@ def _by_segment(lengths: Array, q: Array, qd: Array | None, qdd: Array | None) -
     of_piece = np.minimum(counts[:-1], counts[1:])
     degree = 2 * int(of_piece.max(initial=1)) - 1
     coefficients = np.zeros((degree + 1, lengths.size, q.shape[1]))
-    known = [rows for rows in (q, qd, qdd) if rows is not None]
-    for count in range(1, len(known) + 1):
+    stated = [rows for rows in (q, qd, qdd) if rows is not None]
+    for count in range(1, len(stated) + 1):
         chosen = np.flatnonzero(of_piece == count)
         if chosen.size:
-            ends = [np.stack([rows[chosen + side] for rows in known[:count]]) for side in (0, 1)]
+            ends = [np.stack([rows[chosen + side] for rows in stated[:count]]) for side in (0, 1)]
             pieces = hermite_coefficients(ends[0], ends[1], lengths[chosen, None])
             coefficients[degree + 1 - 2 * count :, chosen] = pieces
     return coefficients

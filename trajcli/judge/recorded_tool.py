@@ -28,7 +28,7 @@ _NEAR_SINGULAR = (
     1e-3  # smallest over largest singular value: a joint turns a thousand times as fast as the tool
 )
 _TWICE = 2.0  # times a limit: no interpolation of dense rows that keep it goes so far beyond
-_CLOSE = 1e-6  # relative: what the room of checks leaves of a chord
+_CLOSE = 1e-6  # relative: what the slack of checks leaves of a chord
 _SAME_STEP = 4.0  # times the steps beside it: more is a jump of the tool
 _STEP = 1e-6  # m or rad: a step of the tool that is none
 
@@ -125,7 +125,7 @@ class ToolJudge:
         for kind in (kind for kind in TOOL_KINDS if kind.key in peaks):
             peak = peaks[kind.key]
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
-            if order > int(window.highest[pieces].max()) or peak.most <= limit * (1 + TOOL_RELATIVE):
+            if order > int(window.highest[pieces].max()) or peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
                 continue
             warned = not asked and self._only_between(window, pieces, robot, kind, peak)
             self._add_peak(window, pieces, robot, kind, peak, move, warned=warned)
@@ -145,14 +145,14 @@ class ToolJudge:
         piece = self._piece_at(window, pieces, peak.time)
         rounding = self._rounding(window, piece, kind.order or 1)
         row = window.row_at(piece, peak.time - float(window.t[piece]))
-        finding = replace(tool_excess(kind, peak.most, limit, peak.time), row=row, rounding=rounding)
-        certain = peak.most - limit > rounding
+        finding = replace(tool_excess(kind, peak.upper_bound, limit, peak.time), row=row, rounding=rounding)
+        certain = peak.upper_bound - limit > rounding
         count = max(self._over(window, pieces, robot, kind), 1)
         self._worst.add(
             kind.name,
             move,
             np.full(count, -1),
-            np.full(count, peak.most / limit),
+            np.full(count, peak.upper_bound / limit),
             lambda _: finding,
             severity="warning" if warned and certain else "error",
             certainty="exceeded" if certain else "within rounding",
@@ -169,9 +169,11 @@ class ToolJudge:
         limit = float(getattr(robot.limits.tcp, kind.key))
         order, angular = kind.order or 1, kind.dimension == "angle"
         lengths = window.lengths[pieces, None]
-        if lengths.max() > DENSE or peak.most > _TWICE * limit:
+        if lengths.max() > DENSE or peak.upper_bound > _TWICE * limit:
             return False
-        room = limit * (1 + _CLOSE) + self._rounding(window, self._piece_at(window, pieces, peak.time), order)
+        slack = limit * (1 + _CLOSE) + self._rounding(
+            window, self._piece_at(window, pieces, peak.time), order
+        )
         rows = slice(pieces.start, pieces.stop + 1)
         states = tuple(None if values is None else values[rows] for values in window.states)
         q = np.asarray(states[0])
@@ -180,7 +182,7 @@ class ToolJudge:
             turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
             traces = np.clip((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
             moved = np.arccos(traces)[:, None] if angular else np.diff(poses[:, :3, 3], axis=0)
-            return bool((np.linalg.norm(moved / lengths, axis=1) <= room).all())
+            return bool((np.linalg.norm(moved / lengths, axis=1) <= slack).all())
         if any(values is None for values in states[:order]):
             return True
         rates = [np.asarray(values) for values in states[1:order]]
@@ -189,7 +191,7 @@ class ToolJudge:
             below = below + jacobian_dot_qd(robot, q, rates[0])
         part = below[:, 3:] if angular else below[:, :3]
         changes = np.linalg.norm(np.diff(part, axis=0) / lengths, axis=1)
-        return bool((changes <= room).all())
+        return bool((changes <= slack).all())
 
     def _over(self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind) -> int:
         """Return at how many rows a speed of the tool is over its limit; 0 for accelerations."""

@@ -172,38 +172,38 @@ class _Judge:
 
     def _compare_poses(self, motion: RecordedMotion, values: Array, poses: Array, errors: Array) -> None:
         """Compare positions and quaternions with the forward kinematics (N, 4, 4)."""
-        room = self._arm * errors + self._table.half("pose") + _EXACT
+        slack = self._arm * errors + self._table.half("pose") + _EXACT
         away = np.linalg.norm(values[:, :3] - poses[:, :3, 3], axis=1)
-        self._add("position", away, room, motion, "is {value} from where the joints take it")
+        self._add("position", away, slack, motion, "is {value} from where the joints take it")
         lengths = np.linalg.norm(values[:, 3:], axis=1)
         turned = matrix_from_quaternion(values[:, 3:] / np.where(lengths > 0.0, lengths, 1.0)[:, None])
         chord = np.linalg.norm(turned - poses[:, :3, :3], axis=(1, 2)) / np.sqrt(8.0)
         angle = 2.0 * np.arcsin(np.minimum(chord, 1.0)) + np.abs(lengths - 1.0)
-        self._add("orientation", angle, 2.0 * room, motion, "is turned by {value} from what the joints make")
+        self._add("orientation", angle, 2.0 * slack, motion, "is turned by {value} from what the joints make")
 
     def _compare_rates(self, motion: RecordedMotion, values: Array, errors: list[Array]) -> None:
         """Compare velocities and accelerations of the tool with those of the joints."""
         assert motion.qd is not None  # noqa: S101
         speed, text = np.abs(motion.qd).sum(axis=1), "is {value} from what the joints make"
-        room = self._arm * (errors[1] + errors[0] * speed) + self._table.half("twist") + _EXACT
+        slack = self._arm * (errors[1] + errors[0] * speed) + self._table.half("twist") + _EXACT
         qd, move = motion.qd, motion.move
         made = self._seen.values(motion.t.size, move, lambda arm, k: tcp_twist(arm, motion.q[k], qd[k]))
         away = values[:, self._table.index("twist")] - made
-        self._add("velocity", np.linalg.norm(away[:, :3], axis=1), room, motion, text)
-        self._add("angular velocity", np.linalg.norm(away[:, 3:], axis=1), room, motion, text)
+        self._add("velocity", np.linalg.norm(away[:, :3], axis=1), slack, motion, text)
+        self._add("angular velocity", np.linalg.norm(away[:, 3:], axis=1), slack, motion, text)
         if not self._table.index("twistd") or motion.qdd is None:
             return
         qdd = motion.qdd
         change = np.abs(qdd).sum(axis=1)
-        room = errors[2] + 2.0 * speed * errors[1] + errors[0] * (change + speed**2)
-        room = self._arm * room + self._table.half("twistd") + _EXACT
+        slack = errors[2] + 2.0 * speed * errors[1] + errors[0] * (change + speed**2)
+        slack = self._arm * slack + self._table.half("twistd") + _EXACT
         made = self._seen.values(motion.t.size, move, lambda arm, k: tcp_twist(arm, motion.q[k], qdd[k]))
         made = made + self._seen.values(
             motion.t.size, move, lambda arm, k: jacobian_dot_qd(arm, motion.q[k], qd[k])
         )
         away = values[:, self._table.index("twistd")] - made
-        self._add("acceleration", np.linalg.norm(away[:, :3], axis=1), room, motion, text)
-        self._add("angular acceleration", np.linalg.norm(away[:, 3:], axis=1), room, motion, text)
+        self._add("acceleration", np.linalg.norm(away[:, :3], axis=1), slack, motion, text)
+        self._add("angular acceleration", np.linalg.norm(away[:, 3:], axis=1), slack, motion, text)
 
     def _see_rates(self, motion: RecordedMotion, values: Array, poses: Array) -> None:
         """Judge velocities beside positions alone: by how the tool moves and turns from row to row.
@@ -260,20 +260,20 @@ class _Judge:
             target = path.at_s(s, "right").target()
             off, split = residuals(target, poses[rows]), sum(target.position)
             beyond = np.maximum(np.maximum(s - path.length, -s), 0.0)
-            room = self._arm * errors[rows] + self._table.half("path") + _EXACT
+            slack = self._arm * errors[rows] + self._table.half("path") + _EXACT
             away = np.linalg.norm(off[:, :split], axis=1) + beyond
             turned = np.linalg.norm(off[:, split:], axis=1)
-            self._add_along_path(motion, away, room + of_move.tolerance.position, rows, "position")
-            self._add_along_path(motion, turned, room + of_move.tolerance.angle, rows, "orientation")
+            self._add_along_path(motion, away, slack + of_move.tolerance.position, rows, "position")
+            self._add_along_path(motion, turned, slack + of_move.tolerance.angle, rows, "orientation")
             self._see_law(motion, values, rows, move)
 
     def _add_along_path(
-        self, motion: RecordedMotion, away: Array, room: Array | float, rows: NDArray[np.intp], quantity: str
+        self, motion: RecordedMotion, away: Array, slack: Array | float, rows: NDArray[np.intp], quantity: str
     ) -> None:
         part = replace(motion, t=motion.t[rows], first_row=motion.first_row + int(rows[0]), move=None)
         text = "is {value} from where s is on its path"
         assert motion.move is not None  # noqa: S101
-        self._add(quantity, away, room, part, text, int(motion.move[rows[0]]))
+        self._add(quantity, away, slack, part, text, int(motion.move[rows[0]]))
 
     def _see_law(self, motion: RecordedMotion, values: Array, rows: NDArray[np.intp], move: int) -> None:
         """Judge s and its derivatives in a move as the motion of one axis."""
@@ -287,14 +287,14 @@ class _Judge:
         self,
         quantity: str,
         away: Array,
-        room: Array | float,
+        slack: Array | float,
         motion: RecordedMotion,
         text: str,
         move: int = -1,
     ) -> None:
-        """Add where the tool is away by more than a room."""
-        rooms = np.broadcast_to(room, away.shape)
-        over = np.flatnonzero(away > rooms)
+        """Add where the tool is away by more than a slack."""
+        slacks = np.broadcast_to(slack, away.shape)
+        over = np.flatnonzero(away > slacks)
         if not over.size:
             return
         order = 2 if "acceleration" in quantity else 1 if "velocity" in quantity else 0
@@ -304,7 +304,7 @@ class _Judge:
 
         def make(k: int) -> Finding:
             row = int(over[k])
-            value, limit, time = float(away[row]), float(rooms[row]), float(motion.t[row])
+            value, limit, time = float(away[row]), float(slacks[row]), float(motion.t[row])
             subject = "the tool" if what == "tool" else f"the {what} of the tool"
             return Finding(
                 rule="derivative" if order else "path",
@@ -326,7 +326,7 @@ class _Judge:
             )
 
         self._worst.add(
-            "tool", move, np.full(over.size, -1), away[over] / rooms[over], make, quantity=quantity
+            "tool", move, np.full(over.size, -1), away[over] / slacks[over], make, quantity=quantity
         )
 
 

@@ -59,14 +59,14 @@ class RecordedPath:
         q = np.asarray(window.states[0])
         for low in range(pieces.start, last, _ROWS):
             rows = np.arange(low, min(low + _ROWS, last))
-            room = self._room(q[rows], window)
-            along = self._judge(q[rows], window.t[rows], window.rows[rows], room)
+            slack = self._slack_of(q[rows], window)
+            along = self._judge(q[rows], window.t[rows], window.rows[rows], slack)
             kept = (rows < pieces.stop) & (window.moves[np.minimum(rows + 1, window.last)] == self._move)
             inner, along = rows[kept], along[kept]
             if int(window.highest[pieces].max(initial=0)) > 1 and inner.size:
                 half = 0.5 * window.lengths[inner]
                 middle = horner(window.coefficients[:, inner], half[:, None])
-                self._judge(middle, window.t[inner] + half, window.rows[inner], room[kept], (along, half))
+                self._judge(middle, window.t[inner] + half, window.rows[inner], slack[kept], (along, half))
 
     def see_between(self, window: Intervals, pieces: slice, since: Array) -> None:
         """Judge the middles of pieces that begin in places of the planned motion.
@@ -80,10 +80,10 @@ class RecordedPath:
         middle = horner(window.coefficients[:, pieces], half[:, None])
         law = self._motion.law
         along = law.evaluate(np.clip(since, law.start, law.end))[:, 0]
-        room = self._room(middle, window)
-        self._judge(middle, window.t[pieces] + half, window.rows[pieces], room, (along, half))
+        slack = self._slack_of(middle, window)
+        self._judge(middle, window.t[pieces] + half, window.rows[pieces], slack, (along, half))
 
-    def _room(self, q: Array, window: Intervals) -> Array:
+    def _slack_of(self, q: Array, window: Intervals) -> Array:
         """Return by how much the tool may be off by the rounding of the rows, m and rad alike, (N,)."""
         off = stated_errors(q, np.asarray(window.resolution.q), window.resolution.relative)
         return np.asarray(2.0 * max(self._arm, 1.0) * off.sum(axis=1))
@@ -93,7 +93,7 @@ class RecordedPath:
         q: Array,
         t: Array,
         numbers: NDArray[np.int64],
-        room: Array,
+        slack: Array,
         before: tuple[Array, Array] | None = None,
     ) -> Array:
         """Judge rows, or what lies behind rows of known s by some seconds; return their s (N,)."""
@@ -106,21 +106,21 @@ class RecordedPath:
         for quantity, size, limit in zip(
             ("position", "orientation"), sizes, (tolerance.position, tolerance.angle), strict=True
         ):
-            self._add(quantity, size, limit, t, numbers, room)
-        known = determinants(target, poses, jacobians, self._arm)
-        if known is not None:
-            self._watch_branch(np.sign(known), t, numbers)
+            self._add(quantity, size, limit, t, numbers, slack)
+        of_rows = determinants(target, poses, jacobians, self._arm)
+        if of_rows is not None:
+            self._watch_branch(np.sign(of_rows), t, numbers)
         return s
 
     def _nearest(self, poses: Array, t: Array, before: tuple[Array, Array] | None) -> Array:
         """Return the values of s (N,) at which the path is nearest to the tool, each near the one before."""
         turning = self._path.poses.pure_rotation
         rows = slice(0, 3)
-        known, own = (
+        of_path, own = (
             (each[:, rows, :3].reshape(len(each), -1) if turning else each[:, :3, 3])
             for each in (self._poses, poses)
         )
-        square = (own**2).sum(axis=1)[:, None] - 2.0 * own @ known.T + (known**2).sum(axis=1)
+        square = (own**2).sum(axis=1)[:, None] - 2.0 * own @ of_path.T + (of_path**2).sum(axis=1)
         if before is None:
             s = self._s[self._followed(square, own, t)]
         else:
@@ -177,7 +177,7 @@ class RecordedPath:
         return np.asarray(0.5 * sum(axes))
 
     def _add(
-        self, quantity: str, sizes: Array, limit: float, t: Array, numbers: NDArray[np.int64], room: Array
+        self, quantity: str, sizes: Array, limit: float, t: Array, numbers: NDArray[np.int64], slack: Array
     ) -> None:
         over = np.flatnonzero(exceeds(sizes, limit))
         if not over.size:
@@ -199,7 +199,7 @@ class RecordedPath:
                 row=int(numbers[row]),
                 method="sampled",
                 quantity=quantity,
-                rounding=float(room[row]),
+                rounding=float(slack[row]),
                 message=f"the tool {what} its path by {{value}} {at_time(time)}, promised are {{limit}}",
                 amounts={
                     "value": Amount(value, 0, None, dimension, "up"),
@@ -207,7 +207,7 @@ class RecordedPath:
                 },
             )
 
-        certain = sizes[over] - limit > room[over]
+        certain = sizes[over] - limit > slack[over]
         joints = np.full(over.size, -1)
         groups: tuple[tuple[NDArray[np.bool_], Certainty], ...] = (
             (certain, "exceeded"),

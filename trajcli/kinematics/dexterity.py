@@ -100,9 +100,9 @@ def changes_of_sign(determinants: Array) -> NDArray[np.intp]:
 
     Zeros have none: the sign before them counts.
     """
-    known = np.flatnonzero(determinants)
-    signs = np.sign(determinants[known])
-    return np.asarray(known[1:][signs[1:] != signs[:-1]])
+    nonzero = np.flatnonzero(determinants)
+    signs = np.sign(determinants[nonzero])
+    return np.asarray(nonzero[1:][signs[1:] != signs[:-1]])
 
 
 def _scaled(plain: Array, length: float) -> Array:

@@ -115,9 +115,9 @@ class ZoneAround:
         worst, when = 0.0, curve.start
         for _ in range(_HALVINGS):
             at_ends, bound = self._bounds(pieces)
-            known = float(at_ends.max())
-            if known > worst:
-                worst, when = known, float(pieces.starts[at_ends.argmax()])
+            largest = float(at_ends.max())
+            if largest > worst:
+                worst, when = largest, float(pieces.starts[at_ends.argmax()])
             open_ended = bound > max(enough, worst) * (1 + ZONE_RELATIVE)
             if not open_ended.any():
                 settled = bound if bound.size else np.zeros(1)

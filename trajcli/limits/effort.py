@@ -56,15 +56,15 @@ class MoveEfforts(LimitSurvey):
     def share(self) -> float:
         """Return how much of the limits they take at most: above 1 where they break one."""
         low, high = self.robot.limits.effort.T
-        upwards = np.array([peak.most for peak in self.highest]) / high
-        downwards = np.array([peak.most for peak in self.lowest]) / -low
+        upwards = np.array([peak.upper_bound for peak in self.highest]) / high
+        downwards = np.array([peak.upper_bound for peak in self.lowest]) / -low
         return float(max(upwards.max(), downwards.max()))
 
     def beyond(self) -> Iterator[tuple[int, int, float, EffortPeak]]:
         """Yield index, direction, magnitude of the limit and peak of the joints that are over one."""
         for joint, (low, high) in enumerate(self.robot.limits.effort.tolist()):
             for sign, limit, peak in ((1, high, self.highest[joint]), (-1, -low, self.lowest[joint])):
-                if not peak.most <= limit * (1 + EFFORT_RELATIVE):
+                if not peak.upper_bound <= limit * (1 + EFFORT_RELATIVE):
                     yield joint, sign, limit, peak
 
     def held_over(self) -> tuple[int, float, EffortPeak] | None:
@@ -97,7 +97,7 @@ def effort_excess(
     factor = needed_stretch(survey, joint, sign, limit, EFFORT_RELATIVE / 2).factor
     amounts: Amounts = {
         "joint": joints.joint_names[joint],
-        "value": Amount(sign * peak.most, unit=unit, rounded="up" if sign > 0 else "down"),
+        "value": Amount(sign * peak.upper_bound, unit=unit, rounded="up" if sign > 0 else "down"),
         "limit": Amount(sign * limit, unit=unit, rounded="down" if sign > 0 else "up"),
         "gravity": Amount(sign * peak.gravity, unit=unit),
     }
@@ -106,7 +106,7 @@ def effort_excess(
     return Finding(
         kind="effort",
         joint=joints.joint_names[joint],
-        value=sign * peak.most,
+        value=sign * peak.upper_bound,
         limit=sign * limit,
         time=peak.time,
         factor=factor if np.isfinite(factor) else None,

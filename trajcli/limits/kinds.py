@@ -226,8 +226,8 @@ def path_constraints(path: PiecewisePolynomial, robot: Robot) -> tuple[PathConst
     Raises:
         PlanningError: When no law whatever keeps one of them.
     """
-    known = (each for _, each in families(robot.limits, further=True))
-    return tuple(row for each in known for row in each.path_constraints(path, robot))
+    kinds = (each for _, each in families(robot.limits, further=True))
+    return tuple(row for each in kinds for row in each.path_constraints(path, robot))
 
 
 def narrowings(limits: Limits, joint: int, order: int) -> list[Narrowing]:

@@ -51,18 +51,20 @@ def path_bounds(move: LimitedMove) -> tuple[BoundedPeak | None, BoundedPeak | No
         return None, None
     path, tolerance = motion.path, motion.tolerance
     close = _CLOSE * np.array([tolerance.position, tolerance.angle])
-    survey = node_survey(partial(_known, robot, path), pieces, lambda _: close, _HALVINGS)
+    survey = node_survey(partial(_values_at_nodes, robot, path), pieces, lambda _: close, _HALVINGS)
     finite = [bool(np.isfinite(bounds).all()) for bounds in _of_path(path, *pieces[1:])]
     kind = path.orientation
-    known = finite[0], kind == "none" or (finite[1] and kind not in ("yaw", "pitch"))
+    bounded = finite[0], kind == "none" or (finite[1] and kind not in ("yaw", "pitch"))
 
     def peak(function: int) -> BoundedPeak | None:
         near = float(close[function])
         found = survey.largest(function, _norm, lambda _: near, least=0.0)
-        return found if known[function] and found.most <= found.value + 2 * near else None
+        return found if bounded[function] and found.upper_bound <= found.value + 2 * near else None
 
     distance, chord = peak(0), peak(1)
-    return distance, chord and replace(chord, value=_angle(chord.value), most=_angle(chord.most))
+    return distance, chord and replace(
+        chord, value=_angle(chord.value), upper_bound=_angle(chord.upper_bound)
+    )
 
 
 def _norm(vectors: Array) -> Array:
@@ -102,7 +104,9 @@ def _of_path(path: ToolPath, lengths: Array, coefficients: Array) -> Array:
     return np.stack(path.poses.majorants(middle, growth(coefficients[:, :, -1:], lengths, _ORDER)[:, :, 0]))
 
 
-def _known(robot: Robot, path: ToolPath, coefficients: Array, lengths: Array) -> tuple[Array, Array]:
+def _values_at_nodes(
+    robot: Robot, path: ToolPath, coefficients: Array, lengths: Array
+) -> tuple[Array, Array]:
     """Return differences at the nodes (P, 9, 2, 9), and majorants of their ninth order (P, 2).
 
     Where the path has no majorant that of the tool stands alone, and proves nothing.

@@ -75,14 +75,16 @@ class ToolSurvey(LimitSurvey):
                 continue
             if stepping:
                 yield from (_stepping(step, kind, self.begins) for step in stepping)
-            elif not peak.most <= limit * (1 + TOOL_RELATIVE + 2 * self._promised(kind, limit)):
-                yield tool_excess(kind, peak.most, limit, self.begins + peak.time, still=not self.moves)
+            elif not peak.upper_bound <= limit * (1 + TOOL_RELATIVE + 2 * self._promised(kind, limit)):
+                yield tool_excess(
+                    kind, peak.upper_bound, limit, self.begins + peak.time, still=not self.moves
+                )
 
     def excess(self) -> float:
         """Return by how much of a limit the tool is above it."""
         if self.steps:
             return np.inf
-        shares = (peak.most / float(getattr(self.limits.tcp, key)) for key, peak in self.peaks.items())
+        shares = (peak.upper_bound / float(getattr(self.limits.tcp, key)) for key, peak in self.peaks.items())
         return max(shares, default=0.0) - 1
 
     def _promised(self, kind: LimitKind, limit: float) -> float:
@@ -184,8 +186,8 @@ class ToolFamily(LimitFamily):
         limits = robot.limits.tcp
         twists = [tcp_twist(robot, state.position, state.velocity) for state in ends]
         speed, angular_speed = (max(float(np.linalg.norm(t[k : k + 3])) for t in twists) for k in (0, 3))
-        room = 1 + TOOL_RELATIVE
-        return speed > limits.speed * room or angular_speed > limits.angular_speed * room
+        slack = 1 + TOOL_RELATIVE
+        return speed > limits.speed * slack or angular_speed > limits.angular_speed * slack
 
 
 FAMILY = ToolFamily()
@@ -208,8 +210,8 @@ def tool_peaks(robot: Robot, breaks: Array, coefficients: Array) -> Mapping[str,
     order = _order(robot.limits)
     with np.errstate(over="ignore", invalid="ignore"):
         bounds = tool_bounds(robot, breaks, coefficients, order)
-    known = (kind for kind in TOOL_KINDS if kind.order is not None and kind.order <= order)
-    return {kind.key: bounds[2 * (kind.order or 1) - 2 + (kind.dimension == "angle")] for kind in known}
+    kinds = (kind for kind in TOOL_KINDS if kind.order is not None and kind.order <= order)
+    return {kind.key: bounds[2 * (kind.order or 1) - 2 + (kind.dimension == "angle")] for kind in kinds}
 
 
 def _order(limits: Limits) -> int:

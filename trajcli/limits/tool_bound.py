@@ -45,8 +45,8 @@ def tool_bounds(robot: Robot, breaks: Array, coefficients: Array, order: int = 2
     if not long.any():
         return (ToolPeak(0.0, float(breaks[0]), 0.0, np.zeros(3)),) * (2 * order)
 
-    def known(coefficients: Array, lengths: Array) -> tuple[Array, Array]:
-        return _known(robot, coefficients, lengths, order)
+    def values_at_nodes(coefficients: Array, lengths: Array) -> tuple[Array, Array]:
+        return _values_of(robot, coefficients, lengths, order)
 
     def slack(values: Array) -> Array:
         return np.asarray(_CLOSE * np.maximum(_norm(values).max(axis=(0, 1)), _SMALL))
@@ -55,7 +55,7 @@ def tool_bounds(robot: Robot, breaks: Array, coefficients: Array, order: int = 2
         return _CLOSE * max(value, _SMALL)
 
     pieces = starts[long], lengths[long], coefficients[:, long]
-    survey = node_survey(known, pieces, slack, _HALVINGS)
+    survey = node_survey(values_at_nodes, pieces, slack, _HALVINGS)
     return tuple(survey.largest(function, _norm, hull_slack, least=0.0) for function in range(2 * order))
 
 
@@ -108,7 +108,7 @@ def _norm(vectors: Array) -> Array:
     return np.asarray(np.linalg.norm(vectors, axis=-1))
 
 
-def _known(robot: Robot, coefficients: Array, lengths: Array, order: int) -> tuple[Array, Array]:
+def _values_of(robot: Robot, coefficients: Array, lengths: Array, order: int) -> tuple[Array, Array]:
     """Return the vectors at the nodes (P, 9, 2 order, 3), and majorants of the ninth order (P, 2 order)."""
     rates = at_nodes(coefficients, lengths, order)
     values = tool_derivatives(robot, rates).reshape(*rates[0].shape[:2], 2 * order, 3)

@@ -51,8 +51,8 @@ def effort_reports(plan: Plan, index: int) -> list[EffortReport] | None:
 def _report(robot: Robot, joint: int, efforts: MoveEfforts, start: float) -> EffortReport:
     high, low = efforts.highest[joint], efforts.lowest[joint]
     lower, upper = robot.limits.effort[joint].tolist()
-    used = max(high.most / upper, low.most / -lower)
-    upwards = high.most / upper >= low.most / -lower if used > 0 else high.value >= low.value
+    used = max(high.upper_bound / upper, low.upper_bound / -lower)
+    upwards = high.upper_bound / upper >= low.upper_bound / -lower if used > 0 else high.value >= low.value
     worst, sign, limit = (high, 1, upper) if upwards else (low, -1, -lower)
     kind: Literal["N m", "N"] = "N" if effort_unit(robot.joint_types[joint]) == "N" else "N m"
     return EffortReport(
@@ -61,10 +61,10 @@ def _report(robot: Robot, joint: int, efforts: MoveEfforts, start: float) -> Eff
         low_time=low.time - start,
         high=high.value,
         high_time=high.time - start,
-        bound=(-low.most, high.most),
+        bound=(-low.upper_bound, high.upper_bound),
         limit=(_known(lower), _known(upper)),
         used=max(used, 0.0) if math.isfinite(min(-lower, upper)) else None,
-        head_room=limit - worst.most if math.isfinite(limit) else None,
+        head_room=limit - worst.upper_bound if math.isfinite(limit) else None,
         gravity=sign * worst.gravity,
         gravity_share=_share(worst),
         unit=kind,

@@ -322,7 +322,7 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
 
     tool = SampledTool(trajectory, span, move.robot, motion)
     deviation, turned = (float(sizes.max(initial=0.0)) for sizes in tool.deviation)
-    bounds = [None if bound is None else bound.most for bound in tool.bounds]
+    bounds = [None if bound is None else bound.upper_bound for bound in tool.bounds]
     unit = "rad" if motion.pure_rotation else "m"
     wanted = move.planned.wanted_speed
     held, lowest = (None, None) if wanted is None else _held(move, motion.law, wanted, unit)
@@ -374,7 +374,7 @@ def _tool_peak(kind: LimitKind, peak: ToolPeak, limit: float, span: Span) -> Too
     return ToolPeakReport(
         quantity=kind.key,
         value=peak.value,
-        bound=peak.most,
+        bound=peak.upper_bound,
         time=span.start + peak.time,
         limit=None if math.isinf(limit) else limit,
         unit=kind.unit,

@@ -37,8 +37,8 @@ _Solve = Callable[["tuple[PathConstraint, ...]"], "TimeOptimalMotion"]
 def lacks_acceleration(robot: Robot) -> NDArray[np.bool_]:
     """Return which joints have neither limits of acceleration nor of effort, shape (n,)."""
     limits = robot.limits
-    known = np.isfinite(limits.acceleration).all(axis=1) | np.isfinite(limits.effort).all(axis=1)
-    return np.asarray(~known)
+    bounded = np.isfinite(limits.acceleration).all(axis=1) | np.isfinite(limits.effort).all(axis=1)
+    return np.asarray(~bounded)
 
 
 def effort_constraints(path: PiecewisePolynomial, robot: Robot) -> tuple[EffortConstraint, ...]:
@@ -136,7 +136,7 @@ def _proven(trajectory: PiecewisePolynomial, robot: Robot) -> tuple[float, float
     for joint, sign, limit in survey.doubtful(limits, _ROOM):
         needed = needed_stretch(survey, joint, sign, limit, _ROOM).factor
         if needed > 1.0:
-            factor, over = max(factor, needed), max(over, survey.peak(joint, sign).most / limit - 1.0)
+            factor, over = max(factor, needed), max(over, survey.peak(joint, sign).upper_bound / limit - 1.0)
     return factor, over
 
 

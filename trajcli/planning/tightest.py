@@ -85,7 +85,7 @@ def _effort(plan: Plan, index: int) -> tuple[float, str]:
     if efforts is None:
         return 0.0, ""
     sides = zip(efforts.highest, efforts.lowest, robot.limits.effort.tolist(), strict=True)
-    used = [max(high.most / upper, low.most / -lower) for high, low, (lower, upper) in sides]
+    used = [max(high.upper_bound / upper, low.upper_bound / -lower) for high, low, (lower, upper) in sides]
     joint = int(np.argmax(used))
     return used[joint], robot.joint_names[joint]
 

@@ -45,18 +45,18 @@ class LawLimits:
     def used(self, sample: Sample) -> tuple[Array, Array]:
         """Return what is used of any limit at a sample, (N,), and the shares of each row of acceleration."""
         s, v, a, u = sample.state
-        most, rows = [np.zeros(s.size)], []
+        parts, rows = [np.zeros(s.size)], []
         for constraint in self.second:
             given = constraint.rows(s, sample.side)
             with np.errstate(divide="ignore", invalid="ignore"):
-                most.append(np.where(v > 0, v**2 / given.cap, 0.0))
+                parts.append(np.where(v > 0, v**2 / given.cap, 0.0))
             rows.append((given.a.T * a + given.b.T * v**2) / given.c.T)
         for jerk in self.third:
             turn = jerk.rows(s, sample.side)
             value = turn.first.T * u + 3.0 * turn.second.T * (v * a) + turn.third.T * v**3
-            most.append((value / turn.limit.T).max(axis=0, initial=0.0))
+            parts.append((value / turn.limit.T).max(axis=0, initial=0.0))
         shares = np.concatenate(rows)
-        return np.maximum.reduce([*most, shares.max(axis=0, initial=0.0)]), shares
+        return np.maximum.reduce([*parts, shares.max(axis=0, initial=0.0)]), shares
 
 
 @frozen

@@ -166,8 +166,10 @@ class JointConstraint:
         with np.errstate(invalid="ignore"):
             steepest = np.abs(self.acceleration).max(axis=1) / slowest
             steepest = np.where(np.isfinite(slowest), steepest, 0.0).max()
-            most = velocity + 0.5 * acceleration * steepest * durations
-        fast = np.flatnonzero(~(most <= 1.0))  # elsewhere the ends and the acceleration bound the velocity
+            upper_bound = velocity + 0.5 * acceleration * steepest * durations
+        fast = np.flatnonzero(
+            ~(upper_bound <= 1.0)
+        )  # elsewhere the ends and the acceleration bound the velocity
         velocity[fast] = _used(control_points(qd[:, :, fast], durations[fast]), self.velocity)
         return np.stack([velocity, acceleration])
 

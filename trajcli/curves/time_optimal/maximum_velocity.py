@@ -15,20 +15,20 @@ _SAME = 1e-12
 
 
 def maximum_velocity_curve(
-    intervals: IntervalRows, known: Array | None = None, changed: NDArray[np.bool_] | None = None
+    intervals: IntervalRows, previous: Array | None = None, changed: NDArray[np.bool_] | None = None
 ) -> Array:
     """Return the largest x at each grid point that its two intervals have room for, shape (N + 1,).
 
     Args:
         intervals: N of them.
-        known: What it was of intervals that differ only where `changed`.
+        previous: What it was of intervals that differ only where `changed`.
         changed: Shape (N,).
     """
     P, R, C, cap = intervals.P, intervals.R, intervals.C, intervals.cap
     last = _largest(R[:, -1:], P[:, -1:], C[:, -1:], cap[-1:])
-    if known is None or changed is None:
+    if previous is None or changed is None:
         return np.append(largest_in_intervals(P, R, C, cap[:-1]), last)
-    curve = np.append(np.minimum(known[:-1], cap[:-1]), last)
+    curve = np.append(np.minimum(previous[:-1], cap[:-1]), last)
     rows = np.flatnonzero(changed)
     curve[rows] = largest_in_intervals(P[:, rows], R[:, rows], C[:, rows], cap[rows])
     return curve
@@ -78,11 +78,11 @@ def _newton(P: Array, R: Array, C: Array, x: Array) -> Array:
     high, low = np.where(R > 0, bounds, np.inf), np.where(R < 0, bounds, -np.inf)
     columns, k, j = np.arange(x.size), high.argmin(axis=0), low.argmax(axis=0)
     top, bottom = high[k, columns], low[j, columns]
-    rest = bottom <= 0.0  # then y >= 0 decides, the row -y <= 0
-    bottom = np.where(rest, 0.0, bottom)
+    decided = bottom <= 0.0  # then y >= 0 decides, the row -y <= 0
+    bottom = np.where(decided, 0.0, bottom)
     over = bottom > top + _SAME * (np.abs(top) + np.abs(bottom))
-    rise, fall = R[k, columns], np.where(rest, 1.0, -R[j, columns])
-    slope = P[k, columns] * fall + np.where(rest, 0.0, P[j, columns]) * rise
-    crossing = C[k, columns] * fall + np.where(rest, 0.0, C[j, columns]) * rise
+    rise, fall = R[k, columns], np.where(decided, 1.0, -R[j, columns])
+    slope = P[k, columns] * fall + np.where(decided, 0.0, P[j, columns]) * rise
+    crossing = C[k, columns] * fall + np.where(decided, 0.0, C[j, columns]) * rise
     usable = over & (slope > 0)
     return np.where(usable, crossing / np.where(usable, slope, 1.0), x)

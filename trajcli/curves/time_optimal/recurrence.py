@@ -99,9 +99,9 @@ def _abreast(slopes: Array, offsets: Array, limits: Array, z: float) -> Array:
             break
     found = values.T.reshape(-1)[:count]
     if wrong.any():
-        known = length * (int(wrong.argmax()) + 1)
-        rest = slopes[:, known:], offsets[:, known:], limits[known:]
-        found[known:] = _one_by_one(*rest, float(found[known - 1]))
+        right = length * (int(wrong.argmax()) + 1)
+        remainder = slopes[:, right:], offsets[:, right:], limits[right:]
+        found[right:] = _one_by_one(*remainder, float(found[right - 1]))
     return found
 
 

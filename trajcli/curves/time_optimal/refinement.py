@@ -112,13 +112,13 @@ def _unused(intervals: IntervalRows, x: Array) -> tuple[Array, Array]:
         high = np.where(R > 0, bounds, np.inf).min(axis=0, initial=np.inf)
         low = np.where(R < 0, bounds, -np.inf).max(axis=0, initial=-np.inf)
         span = high - low
-        known = np.isfinite(span) & (span > 0)
-        more[block] = np.where(known, (high - y) / np.where(known, span, 1.0), 1.0)
-        less[block] = np.where(known, (y - low) / np.where(known, span, 1.0), 1.0)
+        bounded = np.isfinite(span) & (span > 0)
+        more[block] = np.where(bounded, (high - y) / np.where(bounded, span, 1.0), 1.0)
+        less[block] = np.where(bounded, (y - low) / np.where(bounded, span, 1.0), 1.0)
     return more, less
 
 
-def parts_for(lost: Array, target: float, room: int) -> NDArray[np.intp]:
+def parts_for(lost: Array, target: float, points: int) -> NDArray[np.intp]:
     """Return how many parts to cut each interval into, shape (N,), so that with few points little is lost.
 
     In k parts an interval loses 1 / k^2 of what it does, so that of a given number of points each is worth
@@ -127,7 +127,7 @@ def parts_for(lost: Array, target: float, room: int) -> NDArray[np.intp]:
     Args:
         lost: Time that each interval loses, shape (N,).
         target: What all of them may lose in the end.
-        room: How many points there may be more.
+        points: How many points there may be more.
     """
     root = np.cbrt(lost)
     if not root.any():
@@ -135,7 +135,7 @@ def parts_for(lost: Array, target: float, room: int) -> NDArray[np.intp]:
     unit = (target / root.sum()) ** 0.5
     while True:
         parts: NDArray[np.intp] = np.clip(np.rint(root / unit), 1, _PARTS).astype(np.intp)
-        if (parts - 1).sum() <= room:
+        if (parts - 1).sum() <= points:
             return parts
         unit *= _SPARING
 

@@ -89,9 +89,9 @@ def _labels(used: Array) -> list[int]:
     best, share = used.argmax(axis=1).tolist(), used.max(axis=1).tolist()
     labels: list[int] = []
     last = -1
-    for piece, (column, most) in enumerate(zip(best, share, strict=True)):
-        stays = column == last and most >= _BINDS
-        if not stays and (last < 0 or used[piece, last] < max(_BINDS, most - _STAYS)):
-            last = column if most >= _BINDS else -1
+    for piece, (column, share_of_piece) in enumerate(zip(best, share, strict=True)):
+        stays = column == last and share_of_piece >= _BINDS
+        if not stays and (last < 0 or used[piece, last] < max(_BINDS, share_of_piece - _STAYS)):
+            last = column if share_of_piece >= _BINDS else -1
         labels.append(last)
     return labels

@@ -28,14 +28,14 @@ class ArmsOfMoves:
             moves: Of the job; those without another tool count as none.
         """
         self.own = own
-        known: dict[bytes, Robot] = {own.tool.tobytes(): own}
+        by_tool: dict[bytes, Robot] = {own.tool.tobytes(): own}
         self._by_move: dict[int, Robot] = {}
         for move in moves:
             bits = move.robot.tool.tobytes()
-            if bits not in known:
-                known[bits] = own.with_tool(MountedTool(move.robot.tool))
-            if known[bits] is not own:
-                self._by_move[move.index] = known[bits]
+            if bits not in by_tool:
+                by_tool[bits] = own.with_tool(MountedTool(move.robot.tool))
+            if by_tool[bits] is not own:
+                self._by_move[move.index] = by_tool[bits]
         self.changes = bool(self._by_move)
 
     def of(self, move: int) -> Robot:

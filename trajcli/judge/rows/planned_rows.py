@@ -115,7 +115,7 @@ def compare_with_plan(
     joints = len(plan.loaded.robot.joints)
     rows = open_rows_of(source, topic=topic, field=field, joints=joints)
     columns = tuple(map(parse_column, rows.named.names))
-    found = _known(columns, rows.joint_names, plan)
+    found = _comparable(columns, rows.joint_names, plan)
     if isinstance(found, str):
         return RowComparison(planned=False, difference=found)
     groups, index = found
@@ -137,7 +137,7 @@ def compare_with_plan(
     )
 
 
-def _known(
+def _comparable(
     columns: Sequence[Column], names: tuple[str, ...] | None, plan: Plan
 ) -> tuple[tuple[Group, ...], NDArray[np.intp]] | str:
     """Return the groups of the columns and where each stands in them; what is no column of the plan."""
@@ -259,13 +259,13 @@ def _first_difference(rows: _Rows, plan: Plan, grid: Grid, halves: Array, stamps
         expected = planned[:, rows.index]
         off = np.abs(block - expected)
         off[:, rows.time] = 0.0
-        room = halves + _BITS * np.maximum(1.0, np.abs(expected))
-        wrong = np.flatnonzero((off > room).any(axis=1))
+        slack = halves + _BITS * np.maximum(1.0, np.abs(expected))
+        wrong = np.flatnonzero((off > slack).any(axis=1))
         if wrong.size:
-            known = _Known(rows, plan, halves, stamps)
-            at = known.first_wrong(block, local, wrong)
+            of_rows = _Known(rows, plan, halves, stamps)
+            at = of_rows.first_wrong(block, local, wrong)
             if at is not None:
-                return known.said(block[at], expected[at], off[at] - room[at], done + at + 1)
+                return of_rows.said(block[at], expected[at], off[at] - slack[at], done + at + 1)
         done += len(block)
     return None
 
@@ -314,8 +314,8 @@ def _stands_on(rows: _Rows, grid: Grid, stamps: _Stamps) -> bool:
     for block, (times, _) in zip(rows.blocks(), grid.blocks(_ROWS), strict=True):
         t = block[:, rows.time]
         shift = float(t[0] - times[0]) if shift is None else shift
-        room = 2 * stamps.rounding + _ULPS * np.spacing(np.abs(t) + abs(shift))
-        if (np.abs(t - times - shift) > room).any():
+        slack = 2 * stamps.rounding + _ULPS * np.spacing(np.abs(t) + abs(shift))
+        if (np.abs(t - times - shift) > slack).any():
             return False
     return True
 
@@ -342,10 +342,10 @@ class _Known:
         values = block[wrong]
         self._turn_signs(near, values)
         between = np.abs(np.diff(near, axis=0)).min(axis=0)  # the larger one of both is a step
-        room = self.halves + between + _BITS * np.maximum(1.0, np.abs(near[1]))
+        slack = self.halves + between + _BITS * np.maximum(1.0, np.abs(near[1]))
         off = np.abs(values - near).min(axis=0)
         off[:, self.rows.time] = 0.0
-        differs = np.flatnonzero((off > room).any(axis=1))
+        differs = np.flatnonzero((off > slack).any(axis=1))
         return int(wrong[differs[0]]) if differs.size else None
 
     def _turn_signs(self, near: Array, values: Array) -> None:

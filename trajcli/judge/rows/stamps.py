@@ -32,12 +32,12 @@ class Lattice:
     Attributes:
         origin: Of the first stamp, s.
         period: s.
-        room: By how much stamps may be beside its multiples because the first one was rounded, s.
+        slack: By how much stamps may be beside its multiples because the first one was rounded, s.
     """
 
     origin: float
     period: float
-    room: float = 0.0
+    slack: float = 0.0
 
 
 class Stamps:
@@ -84,8 +84,8 @@ class Stamps:
         origin, period = self.lattice.origin, self.lattice.period
         steps = np.rint((t - origin) / period)
         meant = origin + steps * period
-        room = self.errors(t) + _SLACK * period + _ROUNDING * np.spacing(np.abs(meant)) + self.lattice.room
-        fits = np.abs(t - meant) <= room
+        slack = self.errors(t) + _SLACK * period + _ROUNDING * np.spacing(np.abs(meant)) + self.lattice.slack
+        fits = np.abs(t - meant) <= slack
         if not fits[:-1].all():
             raise UnfitError("a time stamp does not fit the period")
         self._off = not fits[-1]  # the last row may stand at the end of the motion
@@ -129,11 +129,11 @@ def lattice_of(t: Array, errors: Array) -> Lattice | None:
         period = 0.5 * (low + high)
         counted *= max(0.1 * period / error, 2.0)
     origin = _origin(float(t[0]), period, float(errors[0]))
-    room = float(errors[0]) if origin == t[0] else 0.0
+    slack = float(errors[0]) if origin == t[0] else 0.0
     steps = np.rint(since / period)
-    rest = np.abs(inner - (origin + steps * period)) - room
-    fits = (rest <= errors + _ROUNDING * np.spacing(np.abs(inner))).all() and (np.diff(steps) > 0).all()
-    return Lattice(origin, period, room) if fits else None
+    remainder = np.abs(inner - (origin + steps * period)) - slack
+    fits = (remainder <= errors + _ROUNDING * np.spacing(np.abs(inner))).all() and (np.diff(steps) > 0).all()
+    return Lattice(origin, period, slack) if fits else None
 
 
 def _origin(first: float, period: float, error: float) -> float:

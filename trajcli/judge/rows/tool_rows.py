@@ -202,10 +202,10 @@ def _rates(arms: ArmsOfMoves, moves: Moves, q: Array, of_tool: _ToolRows) -> lis
     qd = np.asarray((inverse @ of_tool.group("twist")[..., None])[..., 0])
     if not of_tool.has("twistd"):
         return [qd]
-    rest = of_tool.group("twistd") - arms.values(
+    remainder = of_tool.group("twistd") - arms.values(
         len(q), moves, lambda arm, k: jacobian_dot_qd(arm, q[k], qd[k])
     )
-    return [qd, np.asarray((inverse @ rest[..., None])[..., 0])]
+    return [qd, np.asarray((inverse @ remainder[..., None])[..., 0])]
 
 
 def _of_twists(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array) -> _Found:
@@ -242,9 +242,9 @@ def _of_twists(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array
         qd[k + 1] = slope(q[k + 1], twist[k + 1])
     states = [q, qd]
     if twistd is not None:
-        rest = twistd - jacobian_dot_qd(robot, q, qd)
+        remainder = twistd - jacobian_dot_qd(robot, q, qd)
         inverse = np.linalg.pinv(jacobian(robot, q), rcond=1.0 / _REGULAR)
-        states.append(np.asarray((inverse @ rest[..., None])[..., 0]))
+        states.append(np.asarray((inverse @ remainder[..., None])[..., 0]))
     written = of_tool.decimals("vx")
     lost = _RATES_LOST + int(np.ceil(np.log10(max(float(t[-1] - t[0]), 1.0))))  # roundings add up
     digits = EXACT if written == EXACT else max(written - lost, 0)

@@ -76,12 +76,12 @@ def uncertainty(
     spread = left * np.tile(np.sqrt(variances[kinds]), len(residuals))[:, None]
     covariance = inverse @ (spread.T @ spread) @ inverse.T
     free = _undetermined(fit, jacobian * weights[:, :, None], parameters, options)
-    known = [parameter not in free for parameter in parameters]
+    held = [parameter not in free for parameter in parameters]
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return Uncertainty(
-        tuple(float(value) if each else None for value, each in zip(deviations, known, strict=True)),
+        tuple(float(value) if each else None for value, each in zip(deviations, held, strict=True)),
         _noise(variances, measurements, options),
-        _correlations(covariance, deviations, known, parameters),
+        _correlations(covariance, deviations, held, parameters),
     )
 
 
@@ -119,10 +119,10 @@ def _noise(
 
 
 def _correlations(
-    covariance: Array, deviations: Array, known: Sequence[bool], parameters: Sequence[ArmParameter]
+    covariance: Array, deviations: Array, held: Sequence[bool], parameters: Sequence[ArmParameter]
 ) -> tuple[Correlation, ...]:
     """Return the largest correlations of parameters that are known."""
-    usable = [i for i, each in enumerate(known) if each and deviations[i] > 0]
+    usable = [i for i, each in enumerate(held) if each and deviations[i] > 0]
     pairs = (
         Correlation(parameters[i], parameters[j], float(covariance[i, j] / (deviations[i] * deviations[j])))
         for i, j in combinations(usable, 2)

@@ -87,8 +87,10 @@ def track_branch(follower: Follower, breaks: Array) -> PiecewisePolynomial:
             s = end if step == end - s else s + step
             nodes += [half, s]
             state = last
-            most = max(3.0, travel / (step * speed))
-            travel = step * speed * float(np.clip((_AIM / max(deviation, 1e-12)) ** (1 / _ORDER), 0.5, most))
+            largest = max(3.0, travel / (step * speed))
+            travel = (
+                step * speed * float(np.clip((_AIM / max(deviation, 1e-12)) ** (1 / _ORDER), 0.5, largest))
+            )
     return PiecewisePolynomial(np.array(nodes), np.stack(pieces, axis=1))
 
 

@@ -16,8 +16,8 @@ FULL = 2.0 * np.pi
 
 def widened(bounds: Array) -> Array:
     """Return position limits (n, 2) with the tolerance of a limit added."""
-    room = np.where(np.isfinite(bounds), np.abs(bounds) * 1e-9 + 1e-12, 0.0)
-    return np.asarray(bounds + room * [-1.0, 1.0])
+    slack = np.where(np.isfinite(bounds), np.abs(bounds) * 1e-9 + 1e-12, 0.0)
+    return np.asarray(bounds + slack * [-1.0, 1.0])
 
 
 def beyond(joints: Array, bounds: Array) -> Array:

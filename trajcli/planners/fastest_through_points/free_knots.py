@@ -302,5 +302,5 @@ class _Sensitivity:
         jerks = (self._jerks @ local[..., None])[..., 0] * self._units.spans[2][:, None]
         motion = self._motion
         ends = motion.ends + x * self._units.spans[:2].T * self._free
-        s = np.clip(s, programme.least, programme.most)
+        s = np.clip(s, programme.least, programme.upper_bound)
         return FreeKnots(motion.lengths * (1 + s), ends, motion.jerks + jerks)

@@ -36,7 +36,7 @@ class SegmentProgramme:
         high: Shape (K, n, R), finite.
         cost: Shape (K, m).
         least: Lower bound of s, shape (K, m).
-        most: Upper bound of s, shape (K, m).
+        upper_bound: Upper bound of s, shape (K, m).
         weight: Of the square; makes the answer unique.
     """
 
@@ -45,7 +45,7 @@ class SegmentProgramme:
     high: Array
     cost: Array
     least: Array
-    most: Array
+    upper_bound: Array
     weight: float = 1e-6
 
     @property
@@ -147,28 +147,28 @@ class _Newton:
             ends -= moved[..., : 2 * _ENDS]
             s = s - moved[..., 2 * _ENDS :].sum(axis=1)
         ends -= (self._s_gain @ s[..., None]).reshape(ends.shape)
-        known = (x[1:-1] + ends[:-1, :, _ENDS:] + ends[1:, :, :_ENDS]).reshape(segments - 1, -1)
+        unknowns = (x[1:-1] + ends[:-1, :, _ENDS:] + ends[1:, :, :_ENDS]).reshape(segments - 1, -1)
         answer = np.zeros(programme.size)
         w_answer, x_answer, s_answer = programme.split(answer)
-        x_answer[1:-1] = self._points(known).reshape(segments - 1, joints, _ENDS)
+        x_answer[1:-1] = self._points(unknowns).reshape(segments - 1, joints, _ENDS)
         both = np.concatenate([x_answer[:-1], x_answer[1:]], axis=2)
         along = (both.reshape(segments, 1, -1) @ self._coupling)[:, 0]
         s_answer += (self._s_inverse @ (s - along)[..., None])[..., 0]
         if q:
             shared = np.broadcast_to(s_answer[:, None], (segments, joints, s_answer.shape[1]))
-            rest = np.concatenate([both, shared], axis=2)
-            w_answer[...] = (self._w_inverse @ w[..., None] - self._w_gain @ rest[..., None])[..., 0]
+            others = np.concatenate([both, shared], axis=2)
+            w_answer[...] = (self._w_inverse @ w[..., None] - self._w_gain @ others[..., None])[..., 0]
         return answer
 
-    def _points(self, known: Array) -> Array:
+    def _points(self, constants: Array) -> Array:
         """Return the solution of the block-tridiagonal system."""
-        rows = [known[0]] if len(known) else []
-        for k in range(1, len(known)):
-            rows.append(known[k] - self._across[k - 1].T @ (self._inverses[k - 1] @ rows[-1]))
-        for k in range(len(known) - 1, -1, -1):
-            right = rows[k] - self._across[k] @ rows[k + 1] if k + 1 < len(known) else rows[k]
+        rows = [constants[0]] if len(constants) else []
+        for k in range(1, len(constants)):
+            rows.append(constants[k] - self._across[k - 1].T @ (self._inverses[k - 1] @ rows[-1]))
+        for k in range(len(constants) - 1, -1, -1):
+            right = rows[k] - self._across[k] @ rows[k + 1] if k + 1 < len(constants) else rows[k]
             rows[k] = self._inverses[k] @ right
-        return np.array(rows).reshape(known.shape)
+        return np.array(rows).reshape(constants.shape)
 
 
 def solved(programme: SegmentProgramme, scale: float, rounds: int = 30, exactness: float = 1e-7) -> Array:
@@ -202,7 +202,7 @@ class _Iterate:
 
     def __init__(self, programme: SegmentProgramme, scale: float) -> None:
         low = np.concatenate([programme.low.ravel(), programme.least.ravel()])
-        high = np.concatenate([programme.high.ravel(), programme.most.ravel()])
+        high = np.concatenate([programme.high.ravel(), programme.upper_bound.ravel()])
         self._programme, self._bounds = programme, np.stack([low, -high])
         self._cost = np.zeros(programme.size)
         programme.split(self._cost)[2][:] = programme.cost
@@ -267,8 +267,8 @@ def weighted_least_squares(programme: SegmentProgramme, target: Array, fixed: fl
         fixed: Weight of s, which shall be zero.
     """
     scale = np.concatenate([np.ones(programme.low.size), np.full(programme.cost.size, fixed)])
-    known = np.concatenate([target.ravel(), np.zeros(programme.cost.size)])
-    return _Newton(programme, scale).solve(programme.adjoint(known))
+    constants = np.concatenate([target.ravel(), np.zeros(programme.cost.size)])
+    return _Newton(programme, scale).solve(programme.adjoint(constants))
 
 
 def _length(values: Array, changes: Array) -> float:

@@ -180,13 +180,13 @@ class ShareProgramme:
         self._orders, self._sizes = np.concatenate(orders), np.concatenate(sizes)
         self._parts = np.concatenate(parts)
 
-    def least_duration(self, box: ShareBox, guess: float, most: float) -> float:
+    def least_duration(self, box: ShareBox, guess: float, longest: float) -> float:
         """Return a duration, s, that no motion with shares in a box falls below.
 
         Args:
             box: Of shares.
             guess: The duration for which multipliers are found, s.
-            most: The longest that matters, s.
+            longest: The longest that matters, s.
         """
         from scipy.optimize import linprog
         from scipy.sparse import csr_matrix, hstack
@@ -215,7 +215,7 @@ class ShareProgramme:
         np.add.at(weights, orders, y[:, None] * sides)
         np.add.at(weights[:, 0], own_orders, np.maximum(left * low, left * high))
         corners = [[1.0, *corner] for corner in product(*zip(box.low, box.high, strict=True))]
-        return _largest_refuted(weights @ np.transpose(corners), most)
+        return _largest_refuted(weights @ np.transpose(corners), longest)
 
     def rows(self, box: ShareBox) -> tuple[Any, Orders, Array]:
         """Return rows A, orders k and sides (c, g1, g2) with A x <= T^k (c + g1 h1 + g2 h3) in a box."""
@@ -270,8 +270,8 @@ class ShareProgramme:
                     row[variable.node(number) + k] = side * sign
                     row[self.states + 2 * number + k - 1] = -side * factor * size
                     constant = np.array([factor, 0.0, 0.0])
-                    known = _in_shares(variable.part, *envelope) - constant
-                    yield row, k, side * size * value * known
+                    of_shares = _in_shares(variable.part, *envelope) - constant
+                    yield row, k, side * size * value * of_shares
 
 
 def _variables(chain: FlyByChain, on_line: int, in_zone: int) -> Iterator[_Variable]:
@@ -329,10 +329,13 @@ def moment_rows(bounds: Array, intervals: int) -> tuple[Array, Orders, Array]:
         low, high = bounds[order - 1]
         if not np.isfinite([low, high]).all():
             return
-        for sign, most in ((1.0, positive * high - negative * low), (-1.0, negative * high - positive * low)):
+        for sign, upper_bound in (
+            (1.0, positive * high - negative * low),
+            (-1.0, negative * high - positive * low),
+        ):
             rows.append(sign * row)
             orders.append(order)
-            sizes.append(float(most))
+            sizes.append(float(upper_bound))
 
     for k in range(intervals):
         x, v, a = (eye[3 * k + 3 + order] - eye[3 * k + order] for order in range(3))
@@ -369,15 +372,15 @@ def _in_shares(part: int, constant: float, slope: float) -> Array:
     return np.array(outer[part])
 
 
-def _largest_refuted(weights: Array, most: float) -> float:
-    """Return a duration, up to `most`, at which all of several cubic polynomials of it are below 1."""
+def _largest_refuted(weights: Array, longest: float) -> float:
+    """Return a duration, up to `longest`, at which all of several cubic polynomials of it are below 1."""
 
     def refuted(duration: float) -> bool:
         return bool((duration ** np.arange(4.0) @ weights < 1.0 - _SAFE).all())
 
-    if refuted(most):
-        return most
-    low, high = 0.0, most
+    if refuted(longest):
+        return longest
+    low, high = 0.0, longest
     for _ in range(50):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if refuted(middle) else (low, middle)

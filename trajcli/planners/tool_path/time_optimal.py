@@ -153,7 +153,7 @@ def _stretch_of_whole(robot: Robot, trajectory: PiecewisePolynomial, limits: Too
         return 1.0
     peaks = tool_peaks(limited, trajectory.breaks, trajectory.coefficients)
     kinds = [kind for kind in TOOL_KINDS if kind.key in peaks]
-    factors = [(peaks[k.key].most / getattr(limits, k.key)) ** (1 / (k.order or 1)) for k in kinds]
+    factors = [(peaks[k.key].upper_bound / getattr(limits, k.key)) ** (1 / (k.order or 1)) for k in kinds]
     worst = max(factors, default=1.0)
     return float(worst) if worst > 1 + TOOL_RELATIVE else 1.0
 
@@ -163,7 +163,7 @@ def _stretch_by_segment(robot: Robot, solved: TimeOptimalMotion, speeds: SpeedLi
     from trajcli.limits.tool_bound import speed_runs
 
     worst = max(
-        peak.most / limit
+        peak.upper_bound / limit
         for run in speed_runs(robot, speeds, solved.law, solved.trajectory)
         for peak, limit in zip(run.peaks, run.limits, strict=True)
     )

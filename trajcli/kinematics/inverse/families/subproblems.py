@@ -252,19 +252,19 @@ def levels(
     a, b = onto(axis, vector, normal)
     x = difference(level, product(dot(axis, vector), dot(axis, normal)))
     square = np.asarray(np.square(a) + np.square(b))
-    rest = np.asarray(minus_product(square, x, x))
-    flags.note(np.abs(rest) <= TANGENT**2 * square)
-    out = rest < 0.0
+    remainder = np.asarray(minus_product(square, x, x))
+    flags.note(np.abs(remainder) <= TANGENT**2 * square)
+    out = remainder < 0.0
     if out.any():
         x = np.where(out, np.copysign(np.sqrt(square), x), x)
-        rest = np.where(out, 0.0, rest)
-    root = np.sqrt(rest)
+        remainder = np.where(out, 0.0, remainder)
+    root = np.sqrt(remainder)
     y = product(sign, root) if isinstance(sign, float) else np.copysign(root, sign)
     free = square < (FREE * scale) ** 2
     some = bool(free.any())
     if some:
         square = np.where(free, 1.0, square)
-        flags.note(np.asarray(free & np.ones_like(rest, dtype=bool)))
+        flags.note(np.asarray(free & np.ones_like(remainder, dtype=bool)))
     a, b = a / square, b / square
     cosine, sine = flags.fork((product(a, x), product(b, x)), (product(difference(0.0, b), y), product(a, y)))
     return (np.where(free, 1.0, cosine), np.where(free, 0.0, sine)) if some else (cosine, sine), (x, y)
