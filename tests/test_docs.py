@@ -40,7 +40,7 @@ def test_generated_pages_are_current(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", few([path for path in DOCUMENTS if shows_commands(path)], 8), ids=lambda path: path.stem
+    "path", few([path for path in DOCUMENTS if shows_commands(path)], 5), ids=lambda path: path.stem
 )
 def test_commands_print_and_draw_what_is_shown(path: Path) -> None:
     made = outcome(text_of(path))
@@ -273,7 +273,7 @@ JOBS = [
 ]
 
 
-@pytest.mark.parametrize("text", few(JOBS, 20))
+@pytest.mark.parametrize("text", few(JOBS, 12))
 def test_jobs_and_robots_can_be_used_as_they_stand(text: str, tmp_path: Path) -> None:
     content = yaml.safe_load(text)
     if content is None or not {"joints", "moves"} & content.keys():
@@ -327,14 +327,17 @@ def test_commands_that_set_up_the_project_are_not_run() -> None:
 
 @pytest.mark.parametrize(
     "command",
-    [
-        "trajcli plan job.yaml --digits full",
-        "trajcli plan nothing.yaml; echo $?",
-        "cat job.yaml | trajcli explain - | tail -n 3",
-        "cd inside && trajcli plan ../job.yaml -o rows.csv && cat rows.csv",
-        "trajcli plan job.yaml | true; echo ${PIPESTATUS[0]}",
-        "NO_COLOR= trajcli --help",
-    ],
+    few(
+        [
+            "trajcli plan job.yaml --digits full",
+            "trajcli plan nothing.yaml; echo $?",
+            "cat job.yaml | trajcli explain - | tail -n 3",
+            "cd inside && trajcli plan ../job.yaml -o rows.csv && cat rows.csv",
+            "trajcli plan job.yaml | true; echo ${PIPESTATUS[0]}",
+            "NO_COLOR= trajcli --help",
+        ],
+        3,
+    ),
 )
 def test_commands_of_documents_are_those_of_the_command_line(command: str, tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(

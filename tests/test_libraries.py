@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tiers import few
 
 from tests.cli.running import EXAMPLES, ROOT, call
 from trajcli.__main__ import _print_version
@@ -78,7 +79,7 @@ def test_a_missing_library_is_one_line_with_its_command(
     )
 
 
-@pytest.mark.parametrize("job", WITHOUT_RUCKIG)
+@pytest.mark.parametrize("job", few(WITHOUT_RUCKIG, 3))
 def test_what_needs_no_ruckig_works_without_it(job: str, environment: Environment, capfd: Capture) -> None:
     environment.has("ruckig", None)
     code, _, err = call(capfd, "plan", EXAMPLES / f"{job}.yaml", "--no-output")

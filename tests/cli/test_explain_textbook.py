@@ -161,7 +161,7 @@ def test_derivatives_of_example_1(capfd: Capture, job: Path, q: str, q_rate: str
     assert "qd1(t)" not in plain
 
 
-@pytest.mark.parametrize("name", ["septic", "spline_rules", "sync", "line", "cycloidal"])
+@pytest.mark.parametrize("name", few(["septic", "spline_rules", "sync", "line", "cycloidal"], 2))
 def test_derivatives_are_those_of_the_polynomials(
     name: str, capfd: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 from running import COMMAND, ENDLESS, FAST, JOB, LONG, Outcome, call, warm
+from tiers import few
 
 SIGNALS = [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)]
 TRAJCLI = " ".join([sys.executable, "-m", "trajcli"])
@@ -52,7 +53,7 @@ def test_rows_hold_no_summary_where_standard_error_is_closed(folder: Path, rows:
 
 
 @pytest.mark.parametrize(
-    "words", ["plan job.yaml", "--help", "--version", "fk --help", "robots ur5e", "schema"]
+    "words", few(["plan job.yaml", "--help", "--version", "fk --help", "robots ur5e", "schema"], 5)
 )
 @pytest.mark.parametrize("stream", ["&-", "/dev/full"])
 def test_a_closed_or_full_standard_output_is_4(folder: Path, words: str, stream: str) -> None:

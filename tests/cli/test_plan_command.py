@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 from running import EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, SLOWED, call
+from tiers import few
 
 from trajcli.errors import TrajcliError
 
@@ -113,7 +114,7 @@ def test_a_slowed_move_is_an_event(job: Path, capfd: Capture) -> None:
     assert f"{job}:6:5: error: slowed: stretched 2.5 times" in err
 
 
-@pytest.mark.parametrize("example", ["blends", "line", "scorbot_wave", "time_optimal"])
+@pytest.mark.parametrize("example", few(["blends", "line", "scorbot_wave", "time_optimal"], 2))
 def test_examples_verify_and_are_reported(example: str, tmp_path: Path, capfd: Capture) -> None:
     path = tmp_path / "r.json"
     assert (

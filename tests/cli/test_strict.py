@@ -273,7 +273,7 @@ WITHIN = {"within_velocity_by_position", "within_tool_limits", "within_effort_li
 KINDS = sorted({kind for kind in kinds_of_events() if not kind.startswith("_")} - REMARKS | WITHIN)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", few(KINDS, 10))
 def test_strict_sees_the_event(kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path, report, rows = (tmp_path / name for name in ("job.json", "report.json", "rows.csv"))
     path.write_text(json.dumps(job(kind)))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.output.explain import explanation
@@ -136,7 +137,7 @@ def numbers(user: Any, si: Any, path: str = "") -> Iterator[tuple[str, float, fl
                 yield each
 
 
-@pytest.mark.parametrize("name", JOBS)
+@pytest.mark.parametrize("name", few(list(JOBS), 1))
 def test_every_number_is_in_the_units_of_the_job(name: str) -> None:
     user, si = both(JOBS[name])
     assert user["units"] == {"angle": "deg", "length": "mm", "time": "s"}

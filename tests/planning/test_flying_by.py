@@ -100,7 +100,7 @@ def test_a_corner_of_two_joint_moves_is_as_fast_as_the_fastest_known(zone, most,
     assert found * (1 - 1e-3) <= duration(zone=zone) <= most
 
 
-@pytest.mark.parametrize(("zone", "most"), [(0.02, 1.353), (0.05, 1.184)])
+@pytest.mark.parametrize(("zone", "most"), few([(0.02, 1.353), (0.05, 1.184)], 1))
 def test_a_corner_of_two_lines_of_the_tool_is_flown_by(zone, most):
     lines = [
         {"planner": "line", "to": {"xyz": [x, y, 0]}, "law": {"shape": "time_optimal"}}

@@ -66,15 +66,18 @@ def verifies(text: str, mass: float) -> bool:
 
 @pytest.mark.parametrize(
     ("job", "at", "outside"),
-    [
-        (CARRYING.replace("MASS", "0.5"), None, CARRYING),
-        (CARRYING.replace("MASS", "0.5"), 2, CARRYING),
-        (FREE.replace("MASS", "0.5"), None, FREE),
-        (SLOWED.replace("MASS", "0.5"), None, SLOWED),
-        (EMPTY, None, WHOLE),
-        (EMPTY, 0, FIRST),
-    ],
-    ids=["attached", "its move", "free duration", "slowed", "at the tcp", "in one move"],
+    few(
+        [
+            (CARRYING.replace("MASS", "0.5"), None, CARRYING),
+            (CARRYING.replace("MASS", "0.5"), 2, CARRYING),
+            (FREE.replace("MASS", "0.5"), None, FREE),
+            (SLOWED.replace("MASS", "0.5"), None, SLOWED),
+            (EMPTY, None, WHOLE),
+            (EMPTY, 0, FIRST),
+        ],
+        2,
+    ),
+    ids=few(["attached", "its move", "free duration", "slowed", "at the tcp", "in one move"], 2),
 )
 def test_masses_up_to_the_largest_verify_from_outside(job: str, at: int | None, outside: str) -> None:
     found = payload_capacity(job_from_text(job), at)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trajectory_controller as controller
 import yaml
+from tiers import few
 
 from trajcli.errors import TrajcliError
 from trajcli.job.read import load_job
@@ -36,7 +37,7 @@ def content_of(text):
     return yaml.load(text, Loader=yaml.CSafeLoader)
 
 
-@pytest.mark.parametrize("name", QUINTICS + OTHERS)
+@pytest.mark.parametrize("name", few(list(QUINTICS + OTHERS), 4))
 def test_the_controller_accepts_the_goal_and_runs_it_as_planned(name):
     trajectory, knots = planned(name)
     message = content_of(text_of(trajectory, knots))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from independent_reader import ReadBack
 from scipy.spatial.transform import Rotation
+from tiers import few
 
 from trajcli.job.robot import catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
@@ -152,7 +153,7 @@ def chain_text(rng: np.random.Generator, joints: int, angles: str) -> str:
 
 
 @pytest.mark.parametrize("angles", ["any", "right", "almost right"])
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", few(range(40), 14))
 def test_any_chain_has_a_table(angles: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     count = int(rng.integers(3, 13))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import few
 
 from tests.cli.running import call
 from trajcli.errors import InputError
@@ -101,7 +102,7 @@ BY_HAND = [
 ]
 
 
-@pytest.mark.parametrize(("short", "long"), BY_HAND)
+@pytest.mark.parametrize(("short", "long"), few(BY_HAND, 3))
 def test_approach_and_retreat_are_the_moves_written_out(short: list[str], long: list[str]) -> None:
     assert_same_motion(planned(moves(*short)), planned(moves(*long)))
 
@@ -147,7 +148,7 @@ DEFAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("defaults", "move", "written"), DEFAULTS)
+@pytest.mark.parametrize(("defaults", "move", "written"), few(DEFAULTS, 3))
 def test_defaults_are_written_into_the_moves(defaults: str, move: str, written: str) -> None:
     bare = move.partition(", law")[0].partition(", tolerance")[0]
     plan = planned(f"defaults: {defaults}\n" + moves("planner: jerk_limited, to: pose", move))

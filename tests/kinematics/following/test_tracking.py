@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from followed_paths import CASES, solved
+from tiers import few
 
 from trajcli.curves.hermite_fit import fit
 from trajcli.geometry.paths.arc import Arc
@@ -85,7 +86,7 @@ def winding(radius, *, turning):
 
 
 @pytest.mark.parametrize(
-    ("radius", "turning", "questions"), [(0.0, False, 23), (0.001, False, 36), (0.001, True, 150)]
+    ("radius", "turning", "questions"), few([(0.0, False, 23), (0.001, False, 36), (0.001, True, 150)], 1)
 )
 def test_short_ways_are_followed_in_few_steps(radius, turning, questions, monkeypatch):
     """The step goes on from segment to segment; where the direction jumps, what was known before it is left."""

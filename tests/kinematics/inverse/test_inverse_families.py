@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conventions import in_convention
 from inverse_arms import FAMILIES, arm, counts_by_search, gap, random_joints, turning
+from tiers import few
 
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
@@ -31,7 +32,7 @@ def check_random_poses(robot, rng, count):
     return poses, found
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", few(NAMES, 20))
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_closed_forms_close_and_contain_the_generating_joints(name, convention):
     rng = generator(name)

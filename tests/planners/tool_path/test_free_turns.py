@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tiers import few
 from tool_jobs import LEFT, planned
 
 from trajcli.kinematics.jacobian import tcp_twist
@@ -21,7 +22,7 @@ def turning(made):
     return float(np.linalg.norm(twist[:, 3:], axis=1).max())
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", few(SHAPES, 4))
 @pytest.mark.parametrize(
     "free",
     [{"direction": [0, 0, -1]}, {"yaw": 0.0, "tool_axis": "x"}, {"pitch": 0.3, "tool_axis": "x"}],

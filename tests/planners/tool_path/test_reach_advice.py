@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tiers import few
 from tool_jobs import arm, line, plan, refusal
 
 from trajcli.kinematics.forward import forward
@@ -19,7 +20,7 @@ def outwards(by):
     return pose[:3, 3] + by * np.array([np.cos(0.2), np.sin(0.2), 0.0]), pose[:3, :3]
 
 
-@pytest.mark.parametrize(("by", "helps"), [(0.1, True), (0.15, False), (0.5, False)])
+@pytest.mark.parametrize(("by", "helps"), few([(0.1, True), (0.15, False), (0.5, False)], 1))
 def test_freeing_the_orientation_is_proposed_where_it_helps(by, helps):
     xyz, rotation = outwards(by)
     matrix = np.eye(4)

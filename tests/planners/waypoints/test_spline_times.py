@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
 from scipy.optimize import minimize
 from through_jobs import assert_passes, curve_of, plan, refusal
+from tiers import few
 
 VELOCITY, ACCELERATION = 1.0, 3.0
 WITHIN = 1.02  # of the fastest
@@ -100,7 +101,7 @@ def free(rule, q, **rest):
     return plan({"joints": q[0].tolist()}, move, limits=limits, **rest)
 
 
-@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("rule", few(list(RULES), 8))
 @pytest.mark.parametrize(("seed", "joints", "count"), [(1, 1, 4), (2, 2, 4), (3, 2, 6)])
 def test_no_slower_than_the_fastest(rule, seed, joints, count):
     rng = np.random.default_rng(seed)
@@ -242,7 +243,7 @@ def straight_through_the_turns(q, velocity, acceleration):
     ).sum()
 
 
-@pytest.mark.parametrize("count", [100, 300, 1000, 3000])
+@pytest.mark.parametrize("count", few([100, 300, 1000, 3000], 2))
 def test_dense_points_are_passed_about_as_fast_as_any_motion_could(count):
     q = np.sin(10 * np.arange(count + 1) / count)
     points = [{"joints": [value]} for value in q[1:].tolist()]
@@ -251,7 +252,7 @@ def test_dense_points_are_passed_about_as_fast_as_any_motion_could(count):
     assert made.trajectory.duration <= 1.05 * straight_through_the_turns(q, 1.0, 5.0)
 
 
-@pytest.mark.parametrize("rule", ["natural", "clamped", "computed", "quintic", "shape_preserving"])
+@pytest.mark.parametrize("rule", few(["natural", "clamped", "computed", "quintic", "shape_preserving"], 2))
 def test_dense_points_of_two_joints_in_every_rule(rule):
     """Four times as many points on the same curve do not slow it down."""
     limits = {"velocity": 1.0, "acceleration": 5.0}

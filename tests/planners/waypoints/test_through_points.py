@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from through_jobs import assert_passes, curve_of, job_text, plan, refusal
+from tiers import few
 
 from trajcli.errors import FileError, TrajcliError
 from trajcli.job.dump import dump_job
@@ -324,13 +325,16 @@ def test_aligned_moves_end_on_whole_periods(tmp_path):
 
 @pytest.mark.parametrize(
     "fields",
-    [
-        {"planner": "spline"},
-        {"planner": "blends"},
-        {"planner": "waypoints"},
-        {"planner": "time_optimal"},
-        {"planner": "time_optimal", "path": "polyline", "corner": 0.05},
-    ],
+    few(
+        [
+            {"planner": "spline"},
+            {"planner": "blends"},
+            {"planner": "waypoints"},
+            {"planner": "time_optimal"},
+            {"planner": "time_optimal", "path": "polyline", "corner": 0.05},
+        ],
+        2,
+    ),
     ids=lambda fields: fields.get("path", fields["planner"]),
 )
 def test_points_that_rounding_keeps_apart_are_one(fields):

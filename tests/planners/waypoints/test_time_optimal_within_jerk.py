@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from through_jobs import curve_of, plan, refusal
+from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.output.explain import explanation
@@ -33,17 +34,20 @@ def refused(rows=POINTS, *, limits=LIMITS, **rest):
 
 @pytest.mark.parametrize(
     "fields",
-    [
-        {},
-        {"rule": "natural"},
-        {"rule": "clamped"},
-        {"rule": "quintic"},
-        {"parameter": "uniform"},
-        {"path": "polyline"},
-        {"path": "polyline", "corner": 0.05},
-        {"path": "polyline", "corner": 0.5},
-        {"duration": 5.0},
-    ],
+    few(
+        [
+            {},
+            {"rule": "natural"},
+            {"rule": "clamped"},
+            {"rule": "quintic"},
+            {"parameter": "uniform"},
+            {"path": "polyline"},
+            {"path": "polyline", "corner": 0.05},
+            {"path": "polyline", "corner": 0.5},
+            {"duration": 5.0},
+        ],
+        4,
+    ),
 )
 def test_every_kind_of_path_is_verified_and_smooth(fields):
     made = fastest(**fields)
@@ -119,14 +123,17 @@ def test_a_speed_from_which_nothing_stops_in_time_is_refused():
 
 @pytest.mark.parametrize(
     "rows",
-    [
-        [[0.0, 1.0], [1.0, 1.0]],
-        [[0.0, 0.0], [0.5, 0.5], [0.5, 0.5], [1.0, 1.0]],
-        [[0.0, 0.0], [0.2, 0.1], [1.0, 0.5]],
-        [[0.0, 0.0], [0.0, 0.0]],
-        [[0.0, 0.0], [1e-7, 2e-7]],
-        [[0.0, 0.0], [1.0, 0.5], [0.0, 0.0]],
-    ],
+    few(
+        [
+            [[0.0, 1.0], [1.0, 1.0]],
+            [[0.0, 0.0], [0.5, 0.5], [0.5, 0.5], [1.0, 1.0]],
+            [[0.0, 0.0], [0.2, 0.1], [1.0, 0.5]],
+            [[0.0, 0.0], [0.0, 0.0]],
+            [[0.0, 0.0], [1e-7, 2e-7]],
+            [[0.0, 0.0], [1.0, 0.5], [0.0, 0.0]],
+        ],
+        5,
+    ),
 )
 @pytest.mark.parametrize("path", ["spline", "polyline"])
 def test_degenerate_points_have_a_motion(rows, path):
