@@ -131,10 +131,10 @@ def acceleration_steps(
     Raises:
         ValueError: When there are more or fewer limits than spans.
     """
-    known = peaks_by_move(trajectory) if peaks is None else peaks
+    peaks_of_moves = peaks_by_move(trajectory) if peaks is None else peaks
     limited = None if limits_by_move is None else _limited_spans(trajectory, limits_by_move)
     found = []
-    for jumps in _jumps(trajectory, 2, known, _span_of_pieces(trajectory)):
+    for jumps in _jumps(trajectory, 2, peaks_of_moves, _span_of_pieces(trajectory)):
         legal = jumps.present
         if limited is not None:
             begins, ends = _breaking(jumps, limited)

@@ -81,12 +81,12 @@ def _beside(trajectory: Trajectory, span: Span, joint: int, value: float, limit:
 
 
 def _check_joints(
-    trajectory: Trajectory, known: Sequence[Span], ends: Array, destinations: Mapping[int, Destination]
+    trajectory: Trajectory, of_moves: Sequence[Span], ends: Array, destinations: Mapping[int, Destination]
 ) -> Iterator[Finding]:
     """Yield the joint that is furthest from its target, of each span that ends (k, n) beside it."""
     if not destinations:
         return
-    spans = [known[k] for k in destinations]
+    spans = [of_moves[k] for k in destinations]
     targets = np.array([each.joints for each in destinations.values()])
     on_path = [each.tolerance is not None for each in destinations.values()]
     off = np.abs(ends[list(destinations)] - targets)
