@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -21,13 +21,13 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.limits.parts import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
-from trajcli.planners.flying_by.row import ChainRow, joint_bounds
-from trajcli.planners.flying_by.search import PathPart, joint_rates
+from trajcli.planners.flying_by.row import ChainRow, joint_bounds, slowed
+from trajcli.planners.flying_by.search import ChainPart, PathPart, joint_rates
 from trajcli.planners.ruckig import BoundaryProblem, fastest, together
 from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
-_HOPELESS = 1.05  # times a limit after the first steps of a law between states
+_HOPELESS = 1.3  # times a limit after the first steps of a law between states
 _BACKWARD = 1e-9  # of the length: a law that goes back by less stands still
 
 
@@ -47,35 +47,48 @@ class FlownPart:
 
 
 class NoLawError(PlanningError):
-    """No law leads along a course from the state at its start to that at its end."""
+    """No law leads along some courses from the state at the start of each to that at its end.
 
-    def __init__(self, course: int, reason: str) -> None:
+    Attributes:
+        failing: The courses, and the s at which the law of each fails; None where none is known.
+    """
+
+    def __init__(self, reason: str, failing: Mapping[int, float | None]) -> None:
         super().__init__(f"no law is found along a path between two zones: {reason}")
-        self.course = course
+        self.reason, self.failing = reason, dict(failing)
 
 
-def flown_parts(chain: FlyByChain, row: ChainRow, states: Array) -> list[FlownPart]:
+def flown_parts(
+    chain: FlyByChain, row: ChainRow, states: Array, known: Mapping[int, FlownPart] | None = None
+) -> list[FlownPart]:
     """Return the parts of the motion with given states at the nodes: courses and zones in turns.
 
     Args:
         chain: Moves between two stops.
         row: As its nodes and parts.
         states: sd and sdd at the nodes, the ends included, (N, 2).
+        known: Motions along courses that are known, by number.
 
     Raises:
-        NoLawError: When some course has no law between its borders.
+        NoLawError: When some courses have no law between their borders.
         PlanningError: When some zone has no motion.
     """
-    courses = []
+    courses = dict(known or {})
+    failed: list[NoLawError] = []
     for k, course in enumerate(chain.courses):
-        ends, part = states[2 * k : 2 * k + 2], row.parts[2 * k]
-        if course.uniform and isinstance(part, PathPart):
-            courses.append(_along_line(course, part, chain.stretch(k), ends, k))
-        else:
-            with _no_law(k):
-                courses.append(along_path(course, chain.stretch(k), ends, chain.tempos[k]))
+        ends = states[2 * k : 2 * k + 2]
+        if k not in courses:
+            try:
+                courses[k] = along_course(
+                    course, k, chain.stretch(k), ends, chain.tempos[k], row.parts[2 * k]
+                )
+            except NoLawError as error:
+                failed.append(error)
+    if failed:
+        raise NoLawError(failed[0].reason, {k: s for error in failed for k, s in error.failing.items()})
     parts = [courses[0]]
-    for corner, before, behind in zip(chain.corners, courses, courses[1:], strict=False):
+    for k, corner in enumerate(chain.corners):
+        before, behind = courses[k], courses[k + 1]
         borders = [
             np.stack([part.curve.piece_ends(order)[side][-side] for order in range(3)], axis=1)
             for part, side in ((before, 1), (behind, 0))
@@ -83,6 +96,35 @@ def flown_parts(chain: FlyByChain, row: ChainRow, states: Array) -> list[FlownPa
         names = corner.robot.joint_names
         parts += [_through(borders, joint_bounds(corner.robot.limits, corner.tempo), names), behind]
     return parts
+
+
+def along_course(
+    course: Course,
+    index: int,
+    stretch: tuple[float, float],
+    states: Array,
+    tempo: float,
+    part: ChainPart | None = None,
+) -> FlownPart:
+    """Return the fastest motion that is found along a course from one s to another.
+
+    Args:
+        course: Any.
+        index: Its number, for errors.
+        stretch: From which s to which.
+        states: There, (2, 2).
+        tempo: As that of a corner.
+        part: With the bounds of the law of a straight line in joint space; None for those at that pace.
+
+    Raises:
+        NoLawError: When there is none.
+    """
+    if course.uniform:
+        if not isinstance(part, PathPart):
+            part = PathPart(slowed(course.typical_bounds(*stretch), tempo), stretch[1] - stretch[0])
+        return _along_line(course, part, stretch, states, index)
+    with _no_law(index):
+        return along_path(course, stretch, states, tempo)
 
 
 def _along_line(
@@ -100,7 +142,7 @@ def _along_line(
     slowest, reached = float(law.piece_ends(1)[1].min()), law.piece_ends()[1]
     beyond = max(float(reached.max()) - end, begin - float(reached.min()))
     if beyond > _BACKWARD * (end - begin) or slowest < -_BACKWARD * (end - begin) / law.duration:
-        raise NoLawError(index, "it would have to go back between its borders")
+        raise NoLawError("it would have to go back between its borders", {index: None})
     line, start = course.curve.coefficients[:, 0]
     return FlownPart(along_line(start, line, law), course.reference(law), law)
 
@@ -142,8 +184,10 @@ def _no_law(course: int) -> Iterator[None]:
     """Say which course has no law."""
     try:
         yield
-    except (UnreachableSpeedError, UnsettledSpeedError, ReversingLawError) as error:
-        raise NoLawError(course, str(error)) from None
+    except (UnreachableSpeedError, UnsettledSpeedError) as error:
+        raise NoLawError(str(error), {course: error.s}) from None
+    except ReversingLawError as error:
+        raise NoLawError(str(error), {course: None}) from None
 
 
 def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> FlownPart:

@@ -18,23 +18,23 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
-from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.flown_parts import (
     FlownPart,
     NoLawError,
-    along_path,
     findings_of,
     flown_parts,
     zone_motions,
 )
 from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
 from trajcli.planners.flying_by.search import FoundStates, PathPart, begin_search
+from trajcli.planners.flying_by.stopping_laws import StoppingLaws
 
 _MOST = 16  # searches
 _LOWERINGS = 8  # of zones, before laws are looked for
 _MORE = 1e-6  # by which a pace is lowered beyond what is needed
 _SLOWER = 0.95  # the pace of a course that has no law between the states that were found
+_EASINGS = 4  # of a course, before states at its borders are those of slower laws
 _EASED = 0.985  # of the pace of a bent course: states on its limits leave a law no room
 _TRIES, _FASTER, _STEEPER = 6, 1.01, 1.06  # bolder states: times their speeds, times their accelerations
 _ENOUGH = 1e-4  # relative: a gain that is worth another law
@@ -74,6 +74,7 @@ class MotionSearch:
         self._paces: dict[int, float] = {}
         self._lowering = 0.0
         self._near: Array | None = None
+        self._laws = StoppingLaws()
         self._motion: _Motion
 
     def fastest(self, chain: FlyByChain) -> list[FlownPart]:
@@ -86,17 +87,18 @@ class MotionSearch:
         eased = np.array([1.0 if course.uniform else _EASED for course in chain.courses])
         best: list[FlownPart] | None = None
         for _ in range(_MOST):
-            paces = np.array([self._pace(course) for course in chain.courses])
+            paces = np.array([self._pace(k) for k in range(len(chain.courses))])
             found, row = self._searched(paces, eased)
             if not math.isfinite(found.duration):
+                if best is None and self._laws.slow_all(self.chain):
+                    continue
                 break
             try:
-                parts = flown_parts(self.chain, row, found.states)
+                parts = flown_parts(self.chain, row, found.states, self._laws.parts(self.chain))
             except NoLawError as error:
                 if best is not None:
                     break
-                self._paces[id(chain.courses[error.course])] *= _SLOWER
-                eased[error.course] *= _EASED
+                self._ease(error, eased, found.states)
                 continue
             second = best is not None
             if best is None or duration_of(parts) < duration_of(best):
@@ -110,6 +112,17 @@ class MotionSearch:
         self.chain = self._motion.chain  # a later search may have lowered zones more
         self.model = min(self.model, duration_of(best) - self._motion.lowering)
         return best
+
+    def _ease(self, error: NoLawError, eased: Array, states: Array) -> None:
+        """Ask for less of courses that have no law between the states that were found."""
+        for index, s in error.failing.items():
+            course = self.chain.courses[index]
+            if eased[index] > _EASED ** (_EASINGS + 0.5) and not course.uniform:
+                self._paces[id(course)] *= _SLOWER
+                eased[index] *= _EASED
+            else:
+                self._paces.pop(id(course), None)  # the pace of the law that stops
+                self._laws.slow(self.chain, index, s, states)
 
     @property
     def exact(self) -> bool:
@@ -128,13 +141,15 @@ class MotionSearch:
             return parts
         bent = np.repeat([not course.uniform for course in self.chain.courses], 2)
         bent[[0, -1]] = False
+        known = self._laws.parts(self.chain)
+        bent[[2 * k + side for k in known for side in (0, 1)]] = False
         states = self._motion.states
         for _ in range(_TRIES):
             states = np.where(bent[:, None], states * [_FASTER, _STEEPER], states)
             try:
                 if any(self._over(states)):
                     break
-                other = flown_parts(self.chain, self._motion.row, states)
+                other = flown_parts(self.chain, self._motion.row, states, known)
             except PlanningError:
                 break
             if duration_of(other) > duration_of(parts) * (1 - _ENOUGH):
@@ -156,7 +171,7 @@ class MotionSearch:
         """Return the states found, and their row, once zones are as slow as limits ask for."""
         before = math.inf
         for turn in range(_LOWERINGS):
-            row = row_of(self.chain, paces.tolist(), eased.tolist())
+            row = row_of(self.chain, paces.tolist(), eased.tolist(), self._laws.states(self.chain))
             found = _found(row, self.chain.ends, self._near, twice=self.exact)
             if not math.isfinite(found.duration):
                 break
@@ -190,12 +205,16 @@ class MotionSearch:
             for k, part in enumerate(zone_motions(self.chain, states))
         ]
 
-    def _pace(self, course: Course) -> float:
+    def _pace(self, index: int) -> float:
         """Return by what the law of a course is taken to be faster than its typical bounds let it be."""
+        course = self.chain.courses[index]
         if course.uniform:
             return 1.0
         if id(course) not in self._paces:
-            self._paces[id(course)] = _CAREFUL * _own_pace(course)
+            law, ends = self._laws.law(self.chain, index), self._laws.ends(self.chain, index)
+            part = PathPart(course.typical_bounds(0.0, course.length), course.length)
+            expected = float(part.durations(ends[:1], ends[1:])[0, 0])
+            self._paces[id(course)] = _CAREFUL * expected / law.curve.duration
         return self._paces[id(course)]
 
 
@@ -232,14 +251,6 @@ def _found(row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twic
         return forward.until().found()
     found = other.until().found()
     return FoundStates(found.states[::-1] * mirror, found.duration)
-
-
-def _own_pace(course: Course) -> float:
-    """Return by what the fastest law from rest to rest along a course is faster than by typical bounds."""
-    ends, stretch = np.zeros((2, 2)), (0.0, course.length)
-    part = PathPart(course.typical_bounds(*stretch), course.length)
-    expected = float(part.durations(ends[:1], ends[1:])[0, 0])
-    return expected / along_path(course, stretch, ends, 1.0).curve.duration
 
 
 def _changes(chain: FlyByChain, row: ChainRow, found: FoundStates, parts: Sequence[FlownPart]) -> Array:

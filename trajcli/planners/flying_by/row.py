@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -29,7 +30,15 @@ class ChainRow:
 
 def backwards(row: ChainRow) -> ChainRow:
     """Return the row of a chain from its end to its start: speeds stay, accelerations change their sign."""
-    nodes = [BorderNode(_mirrored(node.bounds), node.goes_on, node.leads) for node in reversed(row.nodes)]
+    nodes = [
+        BorderNode(
+            _mirrored(node.bounds),
+            node.goes_on,
+            node.leads,
+            None if node.given is None else node.given * [1.0, -1.0],
+        )
+        for node in reversed(row.nodes)
+    ]
     return ChainRow(tuple(nodes), tuple(_backwards(part) for part in reversed(row.parts)))
 
 
@@ -51,7 +60,9 @@ def _backwards(part: ChainPart) -> ChainPart:
     return ZonePart(bounds, -part.steps, *turned)
 
 
-def row_of(chain: FlyByChain, paces: Sequence[float], eased: Sequence[float]) -> ChainRow:
+def row_of(
+    chain: FlyByChain, paces: Sequence[float], eased: Sequence[float], given: Mapping[int, Array]
+) -> ChainRow:
     """Return a chain as a row.
 
     Args:
@@ -59,6 +70,7 @@ def row_of(chain: FlyByChain, paces: Sequence[float], eased: Sequence[float]) ->
         paces: By what the law of each course is faster than its typical bounds let it be: 1 where these are
             its bounds everywhere.
         eased: What part of the pace of each course the states at its borders may use.
+        given: States (2,) at nodes that may have no others, by number.
     """
     nodes: list[BorderNode] = []
     parts: list[ChainPart] = []
@@ -71,6 +83,8 @@ def row_of(chain: FlyByChain, paces: Sequence[float], eased: Sequence[float]) ->
         if k < len(chain.corners):
             nodes.append(_border(chain, k, course, eased[k], leads=True))
             parts.append(_zone_part(chain.corners[k], course, chain.courses[k + 1]))
+    for number, state in given.items():
+        nodes[number] = replace(nodes[number], given=state)
     return ChainRow(tuple(nodes), tuple(parts))
 
 

@@ -52,11 +52,13 @@ class BorderNode:
         bounds: Of the law about states.
         leads: Whether a path leads to it, along which an acceleration was built up.
         goes_on: Whether one goes on from it.
+        given: The only state that it may have, (2,); None where it may have others.
     """
 
     bounds: BoundsAbout
     leads: bool
     goes_on: bool
+    given: Array | None = None
 
     @cached_property
     def _sizes(self) -> tuple[float, float]:
@@ -72,6 +74,8 @@ class BorderNode:
         behind a zone are none of those before it: where a joint comes back exactly as it went, with the same
         acceleration, ruckig 0.19 crashes.
         """
+        if self.given is not None:
+            return np.tile(self.given, (len(states), 1))
         top, largest = self._sizes
         speed, grid = np.clip(states[:, 0], 0.0, _INSIDE * top), _FINE * top
         if grid:
@@ -143,13 +147,17 @@ class PathPart:
         return fastest_durations(steps, np.hstack([before, after]), limits).reshape(len(first), len(last))
 
 
-def _leave_room(limits: Array, *states: Array) -> None:
-    """Widen bounds (N, 6), which are typical ones, until states (N, 2) at borders are within them."""
-    for each in states:
+def _leave_room(limits: Array, before: Array, after: Array) -> None:
+    """Widen bounds (N, 6), which are typical ones, until states (N, 2) at borders are within them.
+
+    An acceleration at the start is taken back behind it, and one at the end was built up before it: only
+    there does it ask for a larger speed.
+    """
+    for each, sign in ((before, 1.0), (after, -1.0)):
         change = np.abs(each[:, 1]) / _INSIDE
         limits[:, 2], limits[:, 3] = np.minimum(limits[:, 2], -change), np.maximum(limits[:, 3], change)
-        reached = each[:, 0] / _INSIDE + change**2 / (2 * limits[:, 5])
-        limits[:, 1] = np.maximum(limits[:, 1], reached)
+        beyond = np.maximum(sign * each[:, 1], 0.0) / _INSIDE
+        limits[:, 1] = np.maximum(limits[:, 1], each[:, 0] / _INSIDE + beyond**2 / (2 * limits[:, 5]))
 
 
 @frozen

@@ -1,0 +1,105 @@
+"""States at borders from laws that stop: they have laws and motions, and a chain with them is no slower."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from trajcli.job.read import job_from_text
+from trajcli.kinematics.zone import ZoneAround
+from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
+from trajcli.planners.flying_by.flown_parts import flown_parts
+from trajcli.planners.flying_by.motion_search import with_paces
+from trajcli.planners.flying_by.row import row_of
+from trajcli.planners.flying_by.search import PathPart, begin_search
+from trajcli.planners.flying_by.stopping_laws import StoppingLaws
+from trajcli.planning.plan import plan_job
+
+LIMITS = {"velocity": 3, "acceleration": 8, "jerk": 60}
+LINE = {"planner": "line", "law": {"shape": "time_optimal"}}
+MOVES = {
+    "lines": [{**LINE, "to": {"xyz": [x, 0.392283, 0]}} for x in (0.300748, 0.154969)],
+    "joints": [{"planner": "jerk_limited", "to": {"joints": each}} for each in ([0.9, 1.25], [1.0, 2.0])],
+    "back": [{"planner": "jerk_limited", "to": {"joints": each}} for each in ([0.9, 1.25], [0.3, 1.2])],
+}
+
+
+@cache
+def chain_with(moves: str) -> tuple[FlyByChain, float]:
+    """Return a chain of a planar arm with a zone of 20 mm, and how long it takes with a stop."""
+    job = {"version": 1, "robot": "planar2r", "limits": LIMITS, "start": {"joints": [0.3, 1.2]}, "zone": 0.02}
+    loaded = job_from_text(json.dumps({**job, "moves": MOVES[moves]}))
+    plan = plan_job(job_from_text(json.dumps({**job, "zone": "stop", "moves": MOVES[moves]})))
+    courses = [move.planner.course(move.start.position, move.robot) for move in plan.moves]
+    zone = loaded.job.zone
+    assert zone is not None
+    around = ZoneAround(plan.moves[0].robot, plan.moves[0].planned.end.position, zone)
+    rest = np.zeros(2)
+    return chain_of(courses, [around], (rest, rest), [1.0]), plan.trajectory.duration
+
+
+@pytest.mark.parametrize("pace", [1.0, 0.6])
+@pytest.mark.parametrize("moves", MOVES)
+def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace):
+    """Even at a lower pace in its zone than elsewhere its motion is one: then it takes that much longer."""
+    chain, stopping = chain_with(moves)
+    chain = with_paces(chain, [pace])
+    laws = StoppingLaws()
+    assert laws.slow_all(chain)
+    assert not laws.slow_all(chain)
+    row = row_of(chain, [1.0, 1.0], [1.0, 1.0], laws.states(chain))
+    states = begin_search(row.nodes, row.parts, chain.ends).found().states
+    parts = flown_parts(chain, row, states, laws.parts(chain))
+    assert sum(part.curve.duration for part in parts) <= stopping / pace * (1 + 1e-5)
+    for before, after in itertools.pairwise(parts):
+        for order in range(3):
+            gap = before.curve.piece_ends(order)[1][-1] - after.curve.piece_ends(order)[0][0]
+            assert np.abs(gap).max() < 1e-9
+    for order, limit in ((1, 3.0), (2, 8.0), (3, 60.0)):
+        for part in parts:
+            times = np.linspace(0, part.curve.end, 2000)
+            assert np.abs(part.curve.evaluate(times, order)).max() <= limit * (1 + 1e-8)
+
+
+def test_a_state_comes_from_that_of_a_faster_law_to_that_of_the_one_that_stops():
+    chain, _ = chain_with("joints")
+    laws, found = StoppingLaws(), np.array([[0.0, 0.0], [1.2, -3.0], [1.1, 2.0], [0.0, 0.0]])
+    speeds = []
+    for _ in range(3):
+        laws.slow(chain, 0, None, found)
+        (state,) = laws.states(chain).values()
+        speeds.append(state[0])
+    law = laws.law(chain, 0).law
+    assert law is not None
+    times = np.linspace(0, law.end, 200001)
+    passed = np.interp(chain.corners[0].left, law.evaluate(times)[:, 0], law.evaluate(times, 1)[:, 0])
+    assert speeds[2] == pytest.approx(passed, rel=1e-6)
+    squares = np.square(speeds)
+    assert squares[0] - squares[2] == pytest.approx(0.6 * (1.2**2 - passed**2), rel=1e-6)
+    assert squares[1] - squares[2] == pytest.approx(0.3 * (1.2**2 - passed**2), rel=1e-6)
+
+
+@pytest.mark.parametrize(("s", "slowed"), [(0.1, 1), (0.9, 2), (None, 3)])
+def test_the_border_nearer_to_where_a_law_fails_is_slowed(s, slowed):
+    """Borders count from the start: course 1 has 1 and 2."""
+    chain, _ = chain_with("back")
+    corner = chain.corners[0]
+    longer = replace(
+        chain, courses=(*chain.courses, chain.courses[0]), corners=(corner, corner), tempos=(1.0,) * 3
+    )
+    laws = StoppingLaws()
+    laws.slow(longer, 1, s, np.full((6, 2), 0.1))
+    assert sum(laws.states(longer)) == slowed
+
+
+def test_no_law_along_a_path_is_taken_to_be_faster_than_its_bounds():
+    """At its largest speed a path of length L takes L / v at least, whatever it accelerates to at its end."""
+    part = PathPart(np.array([-0.25, 0.25, -4, 4, -60, 60]), 0.3, typical=True)
+    start, end = np.zeros((1, 2)), np.array([[0.246, 4.0]])
+    assert part.durations(start, end)[0, 0] > 0.3 / 0.25
+    assert part.durations(end * [1, -1], start)[0, 0] > 0.3 / 0.25
