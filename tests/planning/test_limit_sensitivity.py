@@ -285,3 +285,20 @@ def test_explain_says_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
     with pytest.raises(SystemExit):
         app(["explain", str(job), "--json"])
     assert json.loads(capfd.readouterr().out)["savings"] is None
+
+
+def test_a_search_from_the_motion_that_is_known_finds_what_one_from_nothing_finds() -> None:
+    """What a job with the higher limits lasts, searched from all of its own starting points."""
+    points = [{"joints": at} for at in ([0.5, 0.2], [0.8, 0.9])]
+    move = {"planner": "waypoints", "through": points, "to": {"joints": [1.5, 1.0]}, "starts": 1}
+    limits = {"velocity": 3, "acceleration": 8, "jerk": 60}
+    plan = planned(move, limits, 2)
+    savings = saved(plan)
+    assert len(savings) > 1
+    for (joint, order), seconds in savings.items():
+        name = ("", *limits)[order]
+        higher = {**limits, name: [limits[name] * (RAISED if k == joint else 1) for k in range(2)]}
+        anew = planned(move, higher, 2)
+        assert seconds is not None
+        assert seconds >= -1e-9
+        assert plan.trajectory.duration - seconds == pytest.approx(anew.trajectory.duration, rel=1e-3)

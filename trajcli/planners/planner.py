@@ -358,6 +358,11 @@ class Planner(Model):
         given: float | None = getattr(self, "duration", None)
         return None if given is None else (given, self.model_copy(update={"duration": None}))
 
+    def searched_from(self, planned: Planned) -> Self:
+        """Return the planner of the same move that searches near a motion of it, if it searches at all."""
+        del planned
+        return self
+
     def lasting(self, duration: float) -> Iterator[tuple[str, Self]]:
         """Yield what may be given to a move so that it lasts `duration` seconds, and the move with it."""
         given = getattr(self, "duration", None) is not None

@@ -191,7 +191,8 @@ def _given(plan: Plan, move: PlannedMove) -> Planner:
 def _saving(plan: Plan, move: PlannedMove, joint: int, order: int) -> Saving:
     robot = replace(move.robot, limits=raised(move.robot.limits, joint, order))
     try:
-        faster = plan_move_within(plan.loaded, move.index, _given(plan, move), move.start, robot)
+        planner = _given(plan, move).searched_from(move.planned)
+        faster = plan_move_within(plan.loaded, move.index, planner, move.start, robot)
     except TrajcliError as error:
         return Saving(move.index, joint, order, None, error.problems[0].text(plan.loaded.say))
     return Saving(move.index, joint, order, move.duration - faster.duration)

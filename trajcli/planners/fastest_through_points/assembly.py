@@ -47,13 +47,16 @@ class FastestMotion:
     stopping: float
 
 
-def fastest_motion(problem: WaypointProblem, names: list[str], starts: int) -> FastestMotion:
+def fastest_motion(
+    problem: WaypointProblem, names: list[str], starts: int, known: Array | None = None
+) -> FastestMotion:
     """Return the fastest motion that is found.
 
     Args:
         problem: Points, limits, and what is given.
         names: Of its joints, for messages.
         starts: How many starting points are tried.
+        known: States (K + 1, n, 2) of a motion through the points, from which alone it is searched then.
 
     Raises:
         PlanningError: When none is found.
@@ -64,7 +67,7 @@ def fastest_motion(problem: WaypointProblem, names: list[str], starts: int) -> F
     short = problem.only(kept)
     straight = _straight_candidate(short, names)
     states = None if straight is None else _states_of(short, straight)
-    found = search(short, starts, states, lower)
+    found = search(short, starts, states, lower, None if known is None else known[kept])
     motion = straight
     if straight is None or found.best.duration < straight.duration * (1 - _SLOWER):
         exact = _exact(short, found.best, names)

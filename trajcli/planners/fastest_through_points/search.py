@@ -17,7 +17,7 @@ bits of linear algebra, which differ between processors, do not show.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -62,7 +62,13 @@ class Found:
         return sum(found <= duration * (1 + _ALIKE) for found in self.durations)
 
 
-def search(problem: WaypointProblem, starts: int, straight: Array | None = None, lower: float = 0.0) -> Found:
+def search(
+    problem: WaypointProblem,
+    starts: int,
+    straight: Array | None = None,
+    lower: float = 0.0,
+    known: Array | None = None,
+) -> Found:
     """Return the fastest motion that the first starting points lead to.
 
     Args:
@@ -70,10 +76,15 @@ def search(problem: WaypointProblem, starts: int, straight: Array | None = None,
         starts: How many starting points are tried, 1 to 8.
         lower: A proven lower bound of the duration, s: once it is met no further starting points are tried.
         straight: States (K + 1, n, 2) of the motion along the polyline, where some points are collinear.
+        known: States of a motion through the points: it is one of those that are compared, and the only
+            starting point has eight free knots in each segment, and its times.
     """
     time, lengths = problem.units
     polyline = None if straight is None else _scaled(problem, straight)
-    found = _found(problem.scaled(), starts, polyline, lower / time)
+    along = _stopping if polyline is None else (lambda problem, stopping, best: polyline)
+    begins = (_STARTS[0], along, *_STARTS[2:])[:starts]
+    near = None if known is None else _scaled(problem, known)
+    found = _found(problem.scaled(), begins if near is None else (_from_best(8),), lower / time, near)
     states = found.best.states * np.stack([lengths / time, lengths / time**2], axis=1)
     best = StateMotion(problem.inside(states), found.best.times * time)
     return Found(best, tuple(time * duration for duration in found.durations), found.stopping * time)
@@ -86,24 +97,22 @@ def _scaled(problem: WaypointProblem, states: Array) -> Array:
     return scaled
 
 
-def _found(problem: WaypointProblem, starts: int, straight: Array | None, lower: float) -> Found:
+def _found(problem: WaypointProblem, starts: Sequence[Start], lower: float, known: Array | None) -> Found:
     """Return the fastest motion that is found, all in the units of the problem."""
     stopping = evaluated(problem, problem.stopping())
     if problem.walled and np.isfinite(stopping.duration):
         problem = with_limits_near(problem, stopping.times)
     if problem.segments == 1 or problem.fixed.all():
-        return Found(stopping, (stopping.duration,) * starts, stopping.duration)
+        return Found(stopping, (stopping.duration,) * len(starts), stopping.duration)
     best = stopping
+    if known is not None:
+        best = min(best, within_position_limits(problem, known), key=lambda motion: motion.duration)
     durations: list[float] = []
-    for number, start in enumerate(_STARTS[:starts]):
+    for number, start in enumerate(starts, 1):
         if durations and best.duration <= lower * (1 + _PROVEN):
             break
-        report_progress(f"starting point {number + 1} of {starts}")
-        if number == 1:
-            states = problem.stopping() if straight is None else straight
-        else:
-            states = start(problem, stopping, best)
-        motion = improved(problem, within_position_limits(problem, states))
+        report_progress(f"starting point {number} of {len(starts)}")
+        motion = improved(problem, within_position_limits(problem, start(problem, stopping, best)))
         durations.append(motion.duration)
         if motion.duration < best.duration:
             best = motion

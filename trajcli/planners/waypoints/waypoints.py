@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
+from trajcli.curves.piecewise import Array
 from trajcli.errors import MissingLimitError, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Robot
@@ -105,6 +106,8 @@ class FastestThroughPoints(PointSequence):
         ),
     ] = False
 
+    _known: Array | None = PrivateAttr(default=None)
+
     @model_validator(mode="after")
     def _points_fit(self) -> FastestThroughPoints:
         flaws = [*self._flaws_of_times(), *self._flaws_of_points()]
@@ -143,6 +146,14 @@ class FastestThroughPoints(PointSequence):
         require_possible(points, robot)
         return self._through(points, robot)
 
+    def searched_from(self, planned: Planned) -> Self:
+        """Return the planner that searches from the states of a motion at the points, and from no others."""
+        copy, passed = self.model_copy(), planned.via_points
+        if passed is not None:
+            rates = (planned.curve.evaluate(passed.times, order) for order in (1, 2))
+            copy._known = np.stack([*rates], axis=2)  # noqa: SLF001
+        return copy
+
     def _through(self, points: GivenPoints, robot: Robot) -> Planned:
         """Return the motion of the joints that move; the others stand still."""
         from trajcli.planners.fastest_through_points.assembly import fastest_motion, straight_only
@@ -151,8 +162,11 @@ class FastestThroughPoints(PointSequence):
         joints = np.flatnonzero(points.moving)
         problem = _problem(points, robot, joints)
         names = [robot.joint_names[joint] for joint in joints.tolist()]
-        plan = straight_only if self.straight else fastest_motion
-        fastest = plan(problem, names, self.starts)
+        if self.straight:
+            fastest = straight_only(problem, names, self.starts)
+        else:
+            known = None if self._known is None else self._known[:, joints]
+            fastest = fastest_motion(problem, names, self.starts, known)
         motion = fastest.motion.among(joints, points.positions[0])
         off, times = off_chords(motion, points.positions, robot.limits.velocity)
         joint = None if fastest.joint is None else int(joints[fastest.joint])
