@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import pytest
 
@@ -21,19 +22,43 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
-def metadata(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """The metadata that the hook makes for an address; hatchling itself is there only while a package is built."""
-    interface = ModuleType("hatchling.metadata.plugin.interface")
-    interface.MetadataHookInterface = SimpleNamespace  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, interface.__name__, interface)
+def hooks(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The hooks of the build; hatchling itself is there only while a package is built."""
+    for name, base in (("metadata", "MetadataHookInterface"), ("builders.hooks", "BuildHookInterface")):
+        interface = ModuleType(f"hatchling.{name}.plugin.interface")
+        setattr(interface, base, SimpleNamespace)
+        monkeypatch.setitem(sys.modules, interface.__name__, interface)
     spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def metadata(hooks: ModuleType) -> dict[str, Any]:
+    """The metadata that the hook makes for an address."""
     made: dict[str, Any] = {}
-    module.AddressHook(root=str(ROOT), config={"address": f"{ADDRESS}/"}).update(made)
+    hooks.AddressHook(root=str(ROOT), config={"address": f"{ADDRESS}/"}).update(made)
     return made
+
+
+def test_a_wheel_is_packed_smaller_with_the_same_files(hooks: ModuleType, tmp_path: Path) -> None:
+    wheel, source = tmp_path / "a.whl", (ROOT / "trajcli/errors.py").read_bytes()
+    files = {"a/errors.py": source, "a/empty.py": b"", "a.dist-info/RECORD": b"a/errors.py,,\n"}
+    with ZipFile(wheel, "w", ZIP_DEFLATED) as built:
+        for name, content in files.items():
+            built.writestr(ZipInfo(name, (2026, 11, 26, 12, 0, 0)), content, ZIP_DEFLATED)
+    before = wheel.stat().st_size
+    hooks.SmallWheel().finalize("editable", {}, str(wheel))
+    assert wheel.stat().st_size == before
+    hooks.SmallWheel().finalize("standard", {}, str(wheel))
+    assert wheel.stat().st_size < before
+    with ZipFile(wheel) as packed:
+        assert packed.testzip() is None
+        assert {info.filename: packed.read(info) for info in packed.infolist()} == files
+        assert {info.date_time for info in packed.infolist()} == {(2026, 11, 26, 12, 0, 0)}
 
 
 def test_the_description_has_the_links_of_the_readme_from_anywhere(metadata: dict[str, Any]) -> None:
@@ -78,8 +103,9 @@ def test_one_line_holds_the_address() -> None:
     ("address", "led_to"), [("https://example.org/trajcli", None), (ADDRESS, ADDRESS)], ids=["none", "real"]
 )
 def test_the_site_leads_there_once_the_address_is_real(
-    address: str, led_to: str | None, tmp_path: Path
+    address: str, led_to: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("docs.site_hook.ROOT", tmp_path)
     (tmp_path / "pyproject.toml").write_text(f"[tool.hatch.metadata.hooks.custom]\naddress = '{address}'\n")
-    config = SimpleNamespace(config_file_path=str(tmp_path / "mkdocs.yml"), repo_url="")
+    config = SimpleNamespace(repo_url="")
     assert on_config(config).repo_url == led_to
