@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from running import warm
+from running import call, warm
 
 from trajcli.job.robot import catalogue_names
 
@@ -52,6 +52,34 @@ def test_one_name_or_none_completes() -> None:
 
 def test_commands_complete() -> None:
     assert completed("trajcli", "rob") == ["robots"]
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("plan JOB --set moves.8.du", {"moves.8.duration="}),
+        ("plan JOB --set limits.v", {"limits.velocity="}),
+        ("plan JOB --set output.ra", {"output.rate="}),
+        ("plan nothing.yaml --set units.an", {"units.angle="}),
+        ("plan --set moves.0.du", set()),
+        ("sweep JOB --vary points.above_pi", {"points.above_pick.joints="}),
+        ("plot JOB --joints shoulder_pan_joint,shoulder", {"shoulder_pan_joint,shoulder_lift_joint"}),
+        ("plot nothing.yaml --joints sh", set()),
+        ("plot JOB --quantities q,qdd", {"q,qdd", "q,qddd"}),
+    ],
+)
+def test_paths_joints_and_quantities_complete(words: str, offered: set[str]) -> None:
+    job = Path(__file__).parents[2] / "examples/ur5e_pick.yaml"
+    assert set(completed("trajcli", *words.replace("JOB", str(job)).split())) == offered
+
+
+def test_every_path_that_completes_is_one_of_the_job(capfd: pytest.CaptureFixture[str]) -> None:
+    """Oracle: `--set` itself, which refuses names that a job has not."""
+    job = Path(__file__).parents[2] / "examples/ur5e_pick.yaml"
+    for path in completed("trajcli", "plan", str(job), "--set", "limits."):
+        err = call(capfd, "plan", job, "--no-output", "--set", f"{path}x").err
+        assert "unknown key" not in err
+        assert "did you mean" not in err
 
 
 def test_completion_is_installed(tmp_path: Path) -> None:

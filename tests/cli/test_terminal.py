@@ -11,12 +11,14 @@ from pathlib import Path
 import pytest
 from planned_examples import planned_example
 from running import EXAMPLES, FAST, JOB, call, on_terminal
+from tiers import few
 
 from trajcli.cli.frames import render_problem
 from trajcli.cli.terminal import fitted_table, is_coloured
 from trajcli.errors import Place, Problem
 from trajcli.output.report import report_of
 from trajcli.planning.tightest import tightest_of_moves
+from trajcli.progress import listening
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*m|\r\x1b\[2K")
 PICK = EXAMPLES / "ur5e_pick.yaml"
@@ -130,3 +132,78 @@ def test_moves_have_one_title_and_one_count(capfd: pytest.CaptureFixture[str]) -
     out = call(capfd, "explain", EXAMPLES / "pick_carry_place.yaml", "--move", "2").out
     assert out.startswith("pick_carry_place on UR5e: move 2, one of 3 moves")
     assert "\nmove 2: pick -> place (time_optimal), " in out
+
+
+def test_a_batch_counts_and_says_at_its_end_why_jobs_failed(tmp_path: Path) -> None:
+    for name, text in (("a", JOB), ("b" * 90, JOB), ("c", FAST)):
+        (tmp_path / f"{name}.yaml").write_text(text)
+    code, text = on_terminal("batch", tmp_path, "-o", tmp_path / "rows", "-j", "1")
+    assert code == 1
+    assert "\r\x1b[2K2 of 3 jobs: 2 written, " in text
+    lines = lines_of(text.replace("\r\x1b[2K", "\n"))
+    ends = [k for k, line in enumerate(lines) if re.match(r"(written|failed) +/", line)]
+    assert [lines[k].split()[0] for k in ends] == ["written", "written", "failed"]
+    assert all(lines[k].endswith("  1 s") for k in ends[:2])
+    behind = " ".join(lines[ends[-1] + 1 :])
+    assert re.search(r"c\.yaml: +failed: move 0 \(quintic\): the velocity", behind)
+    assert "quintic" not in " ".join(lines[: ends[-1]])
+    assert max(len(line) for line in lines if "/" not in line) <= 80  # paths are not broken
+    assert "{" not in text
+
+
+def test_a_sweep_counts_and_its_table_fits(tmp_path: Path) -> None:
+    words = ("--vary", "moves.0.duration=0.1,1,3", "--vary", "limits.velocity=20,100", "-j", "1")
+    (tmp_path / "job.yaml").write_text(FAST)
+    code, text = on_terminal("sweep", tmp_path / "job.yaml", *words)
+    assert code == 0
+    assert "\r\x1b[2K5 of 6 points: " in text
+    lines = lines_of(text.replace("\r\x1b[2K", "\n"))
+    head = next(
+        k for k, line in enumerate(lines) if line.startswith("moves.0.duration  limits.velocity  verdict")
+    )
+    assert [line.split()[2] for line in lines[head + 1 : head + 7]].count("exceeded") == 3
+    assert "\x1b[1;31mexceeded\x1b[0m" in text
+    assert max(map(len, lines)) <= 80
+
+
+def test_payload_says_which_trial_runs(capfd: pytest.CaptureFixture[str]) -> None:
+    said: list[str] = []
+    with listening(said.append):
+        call(capfd, "payload", EXAMPLES / "pick_carry_place.yaml", "--set", "output.rate=100")
+    trials = [int(match[1]) for text in said if (match := re.match(r"trial (\d+), [\d.e-]+ kg", text))]
+    assert trials[0] == 1
+    assert trials == sorted(trials)
+    assert trials[-1] > 2
+
+
+@pytest.mark.parametrize("path", few(sorted(EXAMPLES.glob("*.yaml")), 2), ids=lambda path: path.stem)
+def test_no_example_floods_a_terminal(path: Path) -> None:
+    for words, most in ((("plan", path), 30), (("explain", path), 60)):
+        _, text = on_terminal(*words)
+        lines = lines_of(text.replace("\r\x1b[2K", "\n"))
+        assert max(map(len, lines)) <= 80
+        assert len(lines_of(text)) <= most
+
+
+@pytest.mark.parametrize(
+    "words",
+    few(
+        [
+            "robots",
+            "robots ur5e",
+            "fk --robot ur5e 0 -1 1 0 0 0",
+            "jacobian --robot ur5e 0 -1 1 0 0 0",
+            "dynamics --robot ur5e 0 -1 1 0 0 0",
+            "mobility --links 4 --joints 1x4 --space planar",
+            "profiles ros-jtc",
+            "explain examples/weld_seam.yaml --full",
+            "plan examples/cubic.yaml --set limits.velocity=40",
+            "--help",
+            "sweep --help",
+        ],
+        1,
+    ),
+)
+def test_other_commands_fit_eighty_columns(words: str) -> None:
+    _, text = on_terminal(*(word.replace("examples", str(EXAMPLES)) for word in words.split()))
+    assert max(map(len, lines_of(text.replace("\r\x1b[2K", "\n")))) <= 80

@@ -7,11 +7,12 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
+from functools import partial
 from time import monotonic
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, get_args
 
 from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
-from trajcli.batches.task import BatchSetup, JobOutcome, Setup, Task
+from trajcli.batches.task import BatchSetup, JobOutcome, OutcomeName, Setup, Task
 from trajcli.cli.frames import problem_as_json
 from trajcli.cli.outcome import ErrorForm, print_remark, report_error
 from trajcli.cli.progress import ERASE, WIDTH, is_terminal
@@ -42,7 +43,7 @@ def run_batch(options: BatchCommand) -> int:
     progress = Progress(len(tasks))
     try:
         with closing(outcomes_of_tasks(tasks, setup, options, limits, progress.show)) as outcomes:
-            failed = _print_outcomes(outcomes, progress, record, options.errors)
+            failed = _print_outcomes(outcomes, progress, record, options)
     finally:
         progress.erase()
         record.write()
@@ -107,21 +108,45 @@ def timeout_of(options: BatchCommand | SweepCommand) -> float | None:
 
 
 def _print_outcomes(
-    outcomes: Iterator[JobOutcome], progress: Progress, record: Ledgers, errors: ErrorForm
+    outcomes: Iterator[JobOutcome], progress: Progress, record: Ledgers, options: BatchCommand
 ) -> list[JobOutcome]:
-    """Print a line for each outcome as soon as it is there, and why jobs failed; return the failed ones."""
-    failed = list[JobOutcome]()
+    """Print a line for each outcome as soon as it is there, and why jobs failed; return the failed ones.
+
+    Where people read the lines they are words, and the reasons stand behind all of them.
+    """
+    for_people = is_terminal(sys.stdout) and options.errors == "text"
+    failed, reasons = list[JobOutcome](), list[Callable[[], None]]()
     with standard_output() as out:
         for outcome in outcomes:
             if outcome.entry is not None and outcome.outcome == "written":
                 record.add(outcome.job, outcome.entry)
             progress.erase()
-            _print_line(out, _as_json(outcome))
+            if for_people:
+                _write_line(out, _in_words(outcome, progress))
+            else:
+                _write_line(out, json.dumps(_as_json(outcome), ensure_ascii=False, allow_nan=False))
             if outcome.exit_code:
                 failed.append(outcome)
-                _say_why(outcome, record.set_aside(outcome.job), errors)
+                reasons.append(partial(_say_why, outcome, record.set_aside(outcome.job), options.errors))
+                if not for_people:
+                    reasons.pop()()
             progress.add(outcome.outcome, outcome.exit_code)
+        progress.erase()
+    for reason in reasons:
+        reason()
     return failed
+
+
+def _in_words(outcome: JobOutcome, progress: Progress) -> str:
+    """Return an outcome as a line of a terminal: its word with a colour, the job, how long its motion is."""
+    from trajcli.cli.frames import shown
+    from trajcli.cli.terminal import GREEN, RED, columns, painted, shortened
+
+    lasts = "" if outcome.duration is None else f"{outcome.duration:.6g} s"
+    word = f"{outcome.outcome:{progress.widest}}"
+    room = columns() - len(word) - len(lasts) - 4
+    name = shortened(shown(utf8(outcome.job.job)), room)
+    return f"{painted(word, RED if outcome.exit_code else GREEN, sys.stdout)}  {name}  {lasts}".rstrip()
 
 
 def _say_why(outcome: JobOutcome, aside: str | None, errors: ErrorForm) -> None:
@@ -148,10 +173,8 @@ def _first(outcome: JobOutcome) -> str | None:
     return problems[0].text() + more if problems else None
 
 
-def _print_line(out: BinaryIO, value: dict[str, Any]) -> None:
-    out.write(
-        json.dumps(value, ensure_ascii=False, allow_nan=False).encode(errors="backslashreplace") + b"\n"
-    )
+def _write_line(out: BinaryIO, text: str) -> None:
+    out.write(text.encode(errors="backslashreplace") + b"\n")
     out.flush()
 
 
@@ -179,12 +202,14 @@ def _say_what_came(found: BatchJobs, progress: Progress) -> None:
 
 
 class Progress:
-    """How many jobs are done, with what outcome; shown on a terminal beside which no lines are printed."""
+    """How many jobs are done, with what outcome; shown on a terminal, below the lines that stand there."""
+
+    widest = max(map(len, get_args(OutcomeName)))
 
     def __init__(self, total: int, one: str = "job") -> None:
         self.total, self.worst, self._one = total, 0, one
         self._done: Counter[str] = Counter()
-        self._shows = is_terminal(sys.stderr) and not is_terminal(sys.stdout)
+        self._shows = is_terminal(sys.stderr)
         self._begun, self._visible = monotonic(), False
 
     @property

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command
+from trajcli.cli.completion import joint_names, quantity_names
 from trajcli.cli.options import Json, Overrides, profile_words
 
 
@@ -87,10 +88,17 @@ class PlotCommand(Command):
             "--quantities",
             metavar="LIST",
             help="Some of q,qd,qdd,qddd,tau,tool,path,phase; else those that suit the job.",
+            autocompletion=quantity_names,
         ),
     ] = None
     joints: Annotated[
-        list[str], typer.Option("--joints", metavar="NAME...", help="Only these, as a,b or a b; else all.")
+        list[str],
+        typer.Option(
+            "--joints",
+            metavar="NAME...",
+            help="Only these, as a,b or a b; else all.",
+            autocompletion=joint_names,
+        ),
     ] = []
     override: Overrides = []
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False

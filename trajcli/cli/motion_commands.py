@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command, CommandLine
+from trajcli.cli.completion import setting_paths
 from trajcli.cli.options import Consumer, JobErrors, JobFile, RowTimes, robot_names
 
 MotionSource = Annotated[
@@ -67,7 +68,10 @@ class EditCommand(Command):
 
 
 class BatchCommand(CommandLine):
-    """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job."""
+    """Plan many jobs, and write each; unchanged ones are skipped. Prints a line of JSON for each job.
+
+    On a terminal a line for people takes its place, and why jobs failed stands at the end.
+    """
 
     example = "trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows"
 
@@ -116,6 +120,7 @@ class SweepCommand(Command):
             "--vary",
             metavar="PATH=VALUES",
             help="A path as for --set, and its values: A..B:N, both ends included, or v1,v2,...",
+            autocompletion=setting_paths,
         ),
     ]
     samples: Annotated[

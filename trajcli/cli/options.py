@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from trajcli.cli.completion import setting_paths
+
 
 def robot_names(incomplete: str) -> list[str]:
     """Return the names of the catalogue that begin so, for the shell; no robot is read for that."""
@@ -27,7 +29,10 @@ JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is 
 Overrides = Annotated[
     list[str],
     typer.Option(
-        "--set", metavar="PATH=VALUE", help="Override a value of the job, such as moves.0.duration=3."
+        "--set",
+        metavar="PATH=VALUE",
+        help="Override a value of the job, such as moves.0.duration=3.",
+        autocompletion=setting_paths,
     ),
 ]
 Consumer = Annotated[

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING
 
 from trajcli.batches.sweep import PointLedger, Sweep, outcomes_of, parse_axis, sweep_of
 from trajcli.batches.sweep_table import (
+    Form,
     SweepRow,
     SweepTable,
     check_column,
@@ -16,7 +18,8 @@ from trajcli.batches.sweep_table import (
 )
 from trajcli.batches.task import SweepPoint
 from trajcli.cli.batch import Progress, outcomes_of_tasks, processes_of, timeout_of
-from trajcli.cli.outcome import print_lines, print_remark, report_error
+from trajcli.cli.outcome import print_lines, print_remark, print_text, report_error
+from trajcli.cli.progress import is_terminal
 from trajcli.errors import InputError, TrajcliError, utf8
 from trajcli.job.yaml.source import read_bytes
 from trajcli.streams.whole_file import standard_output
@@ -43,23 +46,23 @@ def run_sweep(options: SweepCommand) -> int:
     ledger = PointLedger(options.output, force=options.force)
     progress = Progress(len(sweep.rows), "point")
     run = partial(outcomes_of_tasks, options=options, limits=limits, on_tick=progress.show)
-    points = dict[int, SweepPoint]()
+    points, wrong = dict[int, SweepPoint](), list[TrajcliError]()
     try:
         with closing(outcomes_of(sweep, ledger, run)) as outcomes:
             for row, outcome in outcomes:
                 if outcome.point is None:
-                    progress.erase()
-                    report_error(TrajcliError(*outcome.problems), options.errors)
+                    wrong.append(TrajcliError(*outcome.problems))
                 else:
                     points[row] = outcome.point
                 progress.add(outcome.point.verdict if outcome.point else outcome.outcome, outcome.exit_code)
     finally:
         progress.erase()
+        for error in wrong:
+            report_error(error, options.errors)
     rows = (SweepRow(sweep.values(sweep.rows[row]), points[row]) for row in sorted(points))
     table = SweepTable(paths, tuple(rows))
     if options.output is None:
-        with standard_output() as out:
-            out.write(table.text(form).encode())
+        _print_table(table, form)
     else:
         table.save(options.output)
     if options.plot is not None:
@@ -67,6 +70,25 @@ def run_sweep(options: SweepCommand) -> int:
     _say_what_came(table, progress, options)
     failed = options.strict and any(row.point.verdict != "verified" for row in table.rows)
     return progress.worst or int(failed)
+
+
+def _print_table(table: SweepTable, form: Form) -> None:
+    """Write a table to standard output; on a terminal one that fits its width, with colours of verdicts."""
+    if not is_terminal(sys.stdout):
+        with standard_output() as out:
+            out.write(table.text(form).encode())
+        return
+    from trajcli.cli.terminal import BOLD, GREEN, RED, fitted_table, on_terminal, painted
+
+    cells = [[*map(utf8, table.cells(row))] for row in table.rows]
+    paths = range(len(table.paths))
+    head, *lines = fitted_table([[*table.columns], *cells], (len(table.paths) + 2, *paths))
+    verdicts = [row.point.verdict for row in table.rows]
+    coloured = [
+        line.replace(verdict, painted(verdict, GREEN if verdict == "verified" else RED, sys.stdout), 1)
+        for line, verdict in zip(lines, verdicts, strict=True)
+    ]
+    print_text(on_terminal([painted(head, BOLD, sys.stdout), *coloured]))
 
 
 def _sweep(options: SweepCommand) -> Sweep:
