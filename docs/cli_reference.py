@@ -20,7 +20,8 @@ Data go to stdout, words for people to stderr. A file that is written appears wh
 is standard input where a file is read, and standard output where one is written. `NO_COLOR` is
 honoured. `trajcli --version` prints the version, `trajcli --version --verbose` those of all libraries and
 what extras lack, as a report of a bug needs it. `trajcli --install-completion` completes commands in
-the shell, names of robots and profiles, paths for `--set` and `--vary`, joints and quantities of pictures, and every command has `--help`."""
+the shell, with names of robots and profiles, paths for `--set` and `--vary`, joints and quantities of
+pictures, and every command has `--help`."""
 
 _JSON_ERRORS = """\
 With `--errors json` an error is one line on stderr, errors of usage included:

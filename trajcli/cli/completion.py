@@ -1,4 +1,4 @@
-"""What the shell offers for a word that is being typed: paths of a job, its joints, quantities of pictures.
+"""Completion by the shell of paths of a job, its joints, and quantities of pictures.
 
 Functions of typer; whatever is wrong with the job, they offer what is known without it, and say nothing.
 """
@@ -14,7 +14,7 @@ _DEPTH = 3  # keys below which paths of the schema are not offered
 _FROM_SCHEMA = ("units", "limits", "defaults", "when_over_limit", "zone", "output")
 
 
-def setting_paths(ctx: typer.Context, incomplete: str) -> list[str]:
+def paths_that_begin(ctx: typer.Context, incomplete: str) -> list[str]:
     """Return the paths of a job that begin so, each with its sign of equality: those it has, and may have."""
     from trajcli.job.schema import schema_of
 
@@ -23,7 +23,7 @@ def setting_paths(ctx: typer.Context, incomplete: str) -> list[str]:
     return sorted(f"{path}=" for path in paths if path.startswith(incomplete))
 
 
-def joint_names(ctx: typer.Context, incomplete: str) -> list[str]:
+def joints_that_begin(ctx: typer.Context, incomplete: str) -> list[str]:
     """Return the names of the job's joints that begin so, behind those of a list that stand there."""
     from trajcli.errors import TrajcliError
     from trajcli.job.read import load_job
@@ -36,7 +36,7 @@ def joint_names(ctx: typer.Context, incomplete: str) -> list[str]:
     return []
 
 
-def quantity_names(incomplete: str) -> list[str]:
+def quantities_that_begin(incomplete: str) -> list[str]:
     """Return the quantities of pictures that begin so, behind those of a list that stand there."""
     from trajcli.plots.choice import QUANTITY_NAMES
 

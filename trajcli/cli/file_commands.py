@@ -10,8 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command
-from trajcli.cli.completion import joint_names, quantity_names
-from trajcli.cli.options import Json, Overrides, profile_words
+from trajcli.cli.options import Json, Overrides, joint_names, profile_words, quantity_names
 
 
 class DiffCommand(Command):

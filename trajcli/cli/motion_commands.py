@@ -10,8 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command, CommandLine
-from trajcli.cli.completion import setting_paths
-from trajcli.cli.options import Consumer, JobErrors, JobFile, RowTimes, robot_names
+from trajcli.cli.options import Consumer, JobErrors, JobFile, RowTimes, robot_names, setting_paths
 
 MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy, .npz; - is stdin.")

@@ -6,8 +6,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from trajcli.cli.completion import setting_paths
-
 
 def robot_names(incomplete: str) -> list[str]:
     """Return the names of the catalogue that begin so, for the shell; no robot is read for that."""
@@ -23,6 +21,27 @@ def profile_words(incomplete: str) -> list[str]:
 
     folder = Path(__file__).parent.parent / "profiles"
     return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+
+
+def setting_paths(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Return the paths for `--set` that begin so, for the shell."""
+    from trajcli.cli.completion import paths_that_begin
+
+    return paths_that_begin(ctx, incomplete)
+
+
+def joint_names(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Return the names of the job's joints that begin so, for the shell."""
+    from trajcli.cli.completion import joints_that_begin
+
+    return joints_that_begin(ctx, incomplete)
+
+
+def quantity_names(incomplete: str) -> list[str]:
+    """Return the quantities of pictures that begin so, for the shell."""
+    from trajcli.cli.completion import quantities_that_begin
+
+    return quantities_that_begin(incomplete)
 
 
 JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
