@@ -30,7 +30,7 @@ def test_optimum_is_that_of_a_general_solver(seed, segments, joints, rows, own, 
     programme = random_programme(seed, segments, joints, rows, own, shared)
     y = solved(programme, 0.3)
     matrix = np.array([programme.apply(unit) for unit in np.eye(programme.size)]).T
-    high = np.concatenate([programme.high.ravel(), programme.most.ravel()])
+    high = np.concatenate([programme.high.ravel(), programme.upper_bound.ravel()])
     low = np.concatenate([programme.low.ravel(), programme.least.ravel()])
     cost = np.zeros(programme.size)
     programme.split(cost)[2][:] = programme.cost

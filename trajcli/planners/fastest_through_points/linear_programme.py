@@ -11,6 +11,8 @@ Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 14.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from trajcli.curves.piecewise import Array
@@ -22,6 +24,7 @@ _TINY = 1e-300
 _SMALL = 1e-6  # the least scale by which a gap is judged
 _KEPT = 1e-9  # a row missed by less is kept
 _BEGIN = 1e-3  # of the scale: the least slack to begin with
+_WHOLE = 150  # unknowns up to which a programme is one matrix
 _STIFF = 1e14  # a larger ratio of multiplier and slack changes nothing
 
 
@@ -69,8 +72,42 @@ class SegmentProgramme:
         segments, joints = self.rows.shape[:2]
         return int(segments * joints * self.own + (segments + 1) * joints * _ENDS + self.cost.size)
 
+    @cached_property
+    def whole(self) -> Array | None:
+        """The rows, then those of s, as one matrix for x at inner points and s; None of a large programme.
+
+        Of some fifty unknowns the products of one matrix take less time than those of its blocks.
+        """
+        segments, joints, count = self.low.shape
+        if self.own or self.size > _WHOLE:
+            return None
+        ends = np.zeros((segments, joints, count, segments + 1, joints, _ENDS))
+        shared = np.zeros((segments, joints, count, *self.cost.shape))
+        k, j = np.arange(segments)[:, None], np.arange(joints)
+        ends[k, j, :, k, j] = self.rows[..., :_ENDS]
+        ends[k, j, :, k + 1, j] = self.rows[..., _ENDS : 2 * _ENDS]
+        shared[k, j, :, k] = self.rows[..., 2 * _ENDS :]
+        above = np.concatenate(
+            [ends[..., 1:-1, :, :].reshape(self.low.size, -1), shared.reshape(self.low.size, -1)], axis=1
+        )
+        below = np.zeros((self.cost.size, above.shape[1]))
+        below[:, -self.cost.size :] = np.eye(self.cost.size)
+        return np.concatenate([above, below])
+
+    def inner(self, y: Array) -> Array:
+        """Return x at inner points, and s, of unknowns y without w."""
+        ends = self.rows.shape[1] * _ENDS
+        return np.concatenate([y[ends : -ends - self.cost.size], y[-self.cost.size :]])
+
+    def with_ends(self, inner: Array) -> Array:
+        """Return unknowns y from x at inner points, and s; x at both ends is zero."""
+        none = np.zeros(self.rows.shape[1] * _ENDS)
+        return np.concatenate([none, inner[: -self.cost.size], none, inner[-self.cost.size :]])
+
     def apply(self, y: Array) -> Array:
         """Return the rows times y, then s, as one vector."""
+        if self.whole is not None:
+            return self.whole @ self.inner(y)
         w, x, s = self.split(y)
         segments, joints = self.rows.shape[:2]
         shared = np.broadcast_to(s[:, None], (segments, joints, s.shape[1]))
@@ -79,6 +116,8 @@ class SegmentProgramme:
 
     def adjoint(self, z: Array) -> Array:
         """Return the transposed rows times z, which has a number for each row and for each bound of s."""
+        if self.whole is not None:
+            return self.with_ends(z @ self.whole)
         at, count = self.cost.size, self.low.size
         local = (z[:count].reshape(self.low.shape)[..., None, :] @ self.rows)[..., 0, :]
         q = self.own
@@ -89,6 +128,21 @@ class SegmentProgramme:
         x[1:] += local[..., q + _ENDS : q + 2 * _ENDS]
         s += local[..., q + 2 * _ENDS :].sum(axis=1) + z[count : count + at].reshape(s.shape)
         return y
+
+
+class _WholeNewton:
+    """The matrix weight I + rows' D rows of a small programme."""
+
+    def __init__(self, programme: SegmentProgramme, rows: Array, scale: Array) -> None:
+        self._programme = programme
+        self._matrix = rows.T @ (rows * scale[:, None])
+        self._matrix.flat[:: len(self._matrix) + 1] += programme.weight
+
+    def solve(self, right: Array) -> Array:
+        """Return the solution for a right side."""
+        programme = self._programme
+        inner = np.asarray(np.linalg.solve(self._matrix, programme.inner(right)), dtype=np.float64)
+        return programme.with_ends(inner)
 
 
 class _Newton:
@@ -171,6 +225,11 @@ class _Newton:
         return np.array(rows).reshape(constants.shape)
 
 
+def _newton(programme: SegmentProgramme, scale: Array) -> _Newton | _WholeNewton:
+    whole = programme.whole
+    return _Newton(programme, scale) if whole is None else _WholeNewton(programme, whole, scale)
+
+
 def solved(programme: SegmentProgramme, scale: float, rounds: int = 30, exactness: float = 1e-7) -> Array:
     """Return y (size,) to which a fixed rule of steps leads; see `SegmentProgramme.split`.
 
@@ -232,7 +291,7 @@ class _Iterate:
         programme, slack, force, miss = self._programme, self._slack, self._force, self._miss
         pushed = programme.adjoint(force[0] - force[1])
         dual = self._cost + programme.weight * self.y - pushed
-        newton = _Newton(programme, np.minimum((force / slack).sum(axis=0), _STIFF))
+        newton = _newton(programme, np.minimum((force / slack).sum(axis=0), _STIFF))
 
         def change(wanted: Array | float) -> tuple[Array, Array, Array]:
             """Return the changes of y, slacks and multipliers for products that are wanted."""
