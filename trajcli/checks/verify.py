@@ -119,19 +119,13 @@ def verify(
     moves = _LimitedMoves(trajectory, limits_by_move, promises)
     tools = list(_tools(moves, promises or ()))
     peaks, surveys = peaks_by_move(trajectory), tuple(_further_surveys(moves))
-    whole = [not promise.parts for promise in moves.promises]
-    findings = check_limits(
-        trajectory, limits_by_move, _judged(trajectory, limits_by_move, promises, peaks), whole
-    )
-    for k, (of_span, one) in enumerate(zip(surveys, whole, strict=True)):
-        for survey in of_span.values() if one else ():
-            findings += limit_findings(moves[k], survey)
+    findings = _over_limits(moves, peaks, surveys)
     findings += check_continuity(trajectory, limits_by_move, peaks)
     if promises is not None:
         findings += _check_via_points(trajectory, promises)
         findings += check_targets(trajectory, promises)
         findings += _check_tools(tools)
-        if not all(whole):
+        if any(promise.parts for promise in promises):
             from trajcli.checks.zones import check_flown
 
             findings += check_flown(trajectory, promises)
@@ -144,6 +138,37 @@ def verify(
         unchecked_of_tool=_unchecked_of_tool(moves, peaks),
         surveys=surveys,
     )
+
+
+def over_limits(
+    trajectory: Trajectory, limits_by_move: Sequence[Limits], promises: Sequence[Promise]
+) -> tuple[Finding, ...]:
+    """Return where limits are broken for any t, of `verify` that part alone.
+
+    Args:
+        trajectory: What to judge.
+        limits_by_move: The limits in force, one for each span.
+        promises: What each span says of itself.
+
+    Raises:
+        ValueError: When there are more or fewer limits than spans.
+    """
+    moves = _LimitedMoves(trajectory, limits_by_move, promises)
+    found = _over_limits(moves, peaks_by_move(trajectory), tuple(_further_surveys(moves)))
+    return _in_order(trajectory, found, promises)
+
+
+def _over_limits(
+    moves: _LimitedMoves, peaks: IntervalPeaks, surveys: Sequence[Mapping[str, LimitSurvey]]
+) -> list[Finding]:
+    """Return where moves break limits of joints, and further ones where these are the same all along."""
+    whole = [not promise.parts for promise in moves.promises]
+    judged = _judged(moves.trajectory, moves.limits, moves.promises, peaks)
+    findings = check_limits(moves.trajectory, moves.limits, judged, whole)
+    for k, (of_span, one) in enumerate(zip(surveys, whole, strict=True)):
+        for survey in of_span.values() if one else ():
+            findings += limit_findings(moves[k], survey)
+    return findings
 
 
 def check_limits(
@@ -186,6 +211,7 @@ class _LimitedMoves(Sequence[LimitedMove]):
     """The moves of a trajectory with their limits, made when asked for: most are asked for nothing.
 
     Attributes:
+        trajectory: The whole.
         limits: In force, one for each span.
         promises: What each span says of itself.
     """
@@ -193,7 +219,7 @@ class _LimitedMoves(Sequence[LimitedMove]):
     def __init__(
         self, trajectory: Trajectory, limits_by_move: Sequence[Limits], promises: Sequence[Promise] | None
     ) -> None:
-        self._trajectory, self.limits = trajectory, limits_by_move
+        self.trajectory, self.limits = trajectory, limits_by_move
         self.promises = promises or [Promise()] * len(trajectory.spans)
         for each, what in ((limits_by_move, "limits"), (self.promises, "promises")):
             if len(each) != len(trajectory.spans):
@@ -212,8 +238,8 @@ class _LimitedMoves(Sequence[LimitedMove]):
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         promise = self.promises[index]
-        span, limits = self._trajectory.spans[index], self.limits[index]
-        return LimitedMove(self._trajectory, span, limits, promise.robot, promise.tool)
+        span, limits = self.trajectory.spans[index], self.limits[index]
+        return LimitedMove(self.trajectory, span, limits, promise.robot, promise.tool)
 
 
 def _further_surveys(moves: _LimitedMoves) -> Iterator[Mapping[str, LimitSurvey]]:
@@ -232,11 +258,11 @@ def _further_surveys(moves: _LimitedMoves) -> Iterator[Mapping[str, LimitSurvey]
 def _judged(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
-    promises: Sequence[Promise] | None,
+    promises: Sequence[Promise],
     peaks: IntervalPeaks,
 ) -> IntervalPeaks:
     """Return the extremes that count against the limits: all of them where no move brakes."""
-    if promises is None or all(promise.braking is None for promise in promises):
+    if all(promise.braking is None for promise in promises):
         return peaks
     from trajcli.checks.braking import judged_peaks
 

@@ -50,11 +50,13 @@ def path_bounds(move: LimitedMove) -> tuple[BoundedPeak | None, BoundedPeak | No
     if pieces is None or robot is None or motion is None or motion.path is None:
         return None, None
     path, tolerance = motion.path, motion.tolerance
-    close = _CLOSE * np.array([tolerance.position, tolerance.angle])
-    survey = node_survey(partial(_values_at_nodes, robot, path), pieces, lambda _: close, _HALVINGS)
     finite = [bool(np.isfinite(bounds).all()) for bounds in _of_path(path, *pieces[1:])]
     kind = path.orientation
     bounded = finite[0], kind == "none" or (finite[1] and kind not in ("yaw", "pitch"))
+    if not any(bounded):
+        return None, None
+    close = _CLOSE * np.array([tolerance.position, tolerance.angle])
+    survey = node_survey(partial(_values_at_nodes, robot, path), pieces, lambda _: close, _HALVINGS)
 
     def peak(function: int) -> BoundedPeak | None:
         near = float(close[function])

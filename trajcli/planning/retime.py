@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import ceil, copysign
 
-from trajcli.checks.verify import verify
+from trajcli.checks.verify import over_limits
 from trajcli.curves.operations import scale_time
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
 from trajcli.findings import Finding
@@ -214,7 +214,7 @@ def _event(
 
 def over_limit(move: PlannedMove) -> list[Finding]:
     """Return the findings about a move alone that a longer duration may help against, and about positions."""
-    findings = verify(move.alone(), [move.robot.limits], [move.promise]).findings
+    findings = over_limits(move.alone(), [move.robot.limits], [move.promise])
     return [f for f in findings if f.kind in LIMITS_OF_JOINTS or f.factor is not None]
 
 

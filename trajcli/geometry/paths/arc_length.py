@@ -90,6 +90,41 @@ class ArcLength:
         return np.asarray((self._speed(low[..., None] + width * nodes) * width) @ weights)
 
 
+def inverted_length(square: Array, panels: tuple[Array, Array], whole: Array, distance: Array) -> Array:
+    """Return u (N,) on panels of N curves, at so much arc length behind the start of each panel.
+
+    Args:
+        square: Coefficients of |r'(u)|^2, shape (degree + 1, N), highest power first.
+        panels: Where each panel begins and ends, in u, shape (N,) each.
+        whole: Arc length of each panel, shape (N,), m.
+        distance: Shape (N,), m.
+    """
+    low, high = panels
+    part = distance / whole
+    first, last = (whole / _speed_of(square, u[:, None])[:, 0] for u in panels)
+    u = low + part * first
+    u += part**2 * (3.0 * (high - low) - 2.0 * first - last + part * (first + last - 2.0 * (high - low)))
+    nodes, weights = _gauss()
+    for _ in range(_NEWTON_STEPS):
+        width = (u - low)[:, None]
+        gone = (_speed_of(square, low[:, None] + width * nodes) * width) @ weights
+        step = (gone - distance) / _speed_of(square, u[:, None])[:, 0]
+        u = np.clip(u - step, low, high)
+        if not (np.abs(step) > _NEAR).any():
+            break
+    return u
+
+
+def _speed_of(square: Array, u: Array) -> Array:
+    """Return |r'| at u (N, m), from the coefficients (degree + 1, N) of its square."""
+    result: Array = square[0][:, None] * u
+    result += square[1][:, None]
+    for row in square[2:]:
+        result *= u
+        result += row[:, None]
+    return np.asarray(np.sqrt(result, out=result))
+
+
 @frozen
 class FrameTransport:
     """The rotation Q(u) from Q = I at the first knot.

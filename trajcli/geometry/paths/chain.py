@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from trajcli.errors import InputError, PlanningError, Problem
 from trajcli.frozen import frozen
@@ -37,6 +38,10 @@ from trajcli.geometry.paths.position import (
 )
 from trajcli.geometry.rotation import Array, exp
 
+if TYPE_CHECKING:
+    from trajcli.geometry.paths.many_parts import ManyParts
+
+_MANY = 64  # parts from which on it pays to evaluate many of them together
 _NOTHING = 1e-12  # of a segment, which is rounding where two blends meet
 
 
@@ -89,6 +94,10 @@ class Chain:
         """Where each part begins, and the end, m, one number more than parts."""
         return _offsets(self.parts)
 
+    @cached_property
+    def _lengths(self) -> Array:
+        return np.array([part.length for part in self.parts])
+
     @property
     def length(self) -> float:
         """Arc length, m."""
@@ -109,8 +118,22 @@ class Chain:
         """How far each segment is done."""
         return SegmentProgress(self.borders, self.half_widths)
 
+    @cached_property
+    def _together(self) -> ManyParts | None:
+        """Its parts as tables, where these are very many."""
+        if len(self.parts) < _MANY:
+            return None
+        from trajcli.geometry.paths.many_parts import many_parts
+
+        return many_parts(self.parts)
+
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return p, p', p'' as `PositionCurve` says."""
+        if self._together is not None:
+            s = inside(s, self.length)
+            part = np.searchsorted(self.breaks, s, side)
+            local = np.clip(s - self.offsets[part], 0.0, self._lengths[part])
+            return self._together.evaluate(part, local, lambda k, own: self.parts[k].evaluate(own, side))
         return self._by_part(s, side, lambda k, local: self.parts[k].evaluate(local, side))
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
@@ -133,11 +156,16 @@ class Chain:
     def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
         """Return the bounds of p and Q as `PositionCurve` says."""
         part = np.searchsorted(self.breaks, s, "right")
+
+        def of_part(k: int, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+            return self.parts[k].majorants(self._local(k, s[rows]), rising[:, rows])
+
+        if self._together is not None:
+            return self._together.majorants(part, rising, of_part)
         position, turned = np.zeros(rising.shape), np.zeros(rising.shape)
         for k in np.flatnonzero(np.bincount(part)).tolist():
-            rows = part == k
-            bounds = self.parts[k].majorants(self._local(k, s[rows]), rising[:, rows])
-            position[:, rows], turned[:, rows] = bounds
+            rows = np.flatnonzero(part == k)
+            position[:, rows], turned[:, rows] = of_part(k, rows)
         return position, turned
 
     @cached_property
@@ -185,7 +213,7 @@ class Chain:
 
     def _local(self, part: int, s: Array) -> Array:
         """Return the arc lengths of a part."""
-        local: Array = np.clip(s - self.offsets[part], 0.0, self.parts[part].length)
+        local: Array = np.clip(s - self.offsets[part], 0.0, self._lengths[part])
         return local
 
 

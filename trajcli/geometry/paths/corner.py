@@ -58,17 +58,18 @@ class Blend(Smooth):
     coefficients: Array
 
     @cached_property
-    def _arc(self) -> ArcLength:
+    def arc(self) -> ArcLength:
+        """Its arc length."""
         return ArcLength(self.coefficients)
 
     @cached_property
     def length(self) -> float:
         """Arc length, m."""
-        return float(self._arc.lengths[-1])
+        return float(self.arc.lengths[-1])
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return p, p', p'' as `PositionCurve` says; both sides are the same."""
-        u = self._arc.parameter(inside(s, self.length))
+        u = self.arc.parameter(inside(s, self.length))
         slope, bend = self._derivatives(u)[:2]
         speed = np.linalg.norm(slope, axis=-1, keepdims=True)
         first = slope / speed
@@ -77,7 +78,7 @@ class Blend(Smooth):
 
     def transport(self, s: Array, side: Side = "right") -> Triple:
         """Return Q, w', w'' as `PositionCurve` says: w' = p' x p'', the rate that does not roll about p'."""
-        u = self._arc.parameter(inside(s, self.length))
+        u = self.arc.parameter(inside(s, self.length))
         slope, bend, third = self._derivatives(u)
         square = np.einsum("ni,ni->n", slope, slope)[:, None]
         inner = np.einsum("ni,ni->n", slope, bend)[:, None]
@@ -99,7 +100,7 @@ class Blend(Smooth):
 
     @cached_property
     def _transport(self) -> FrameTransport:
-        knots = self._arc.knots
+        knots = self.arc.knots
         within = np.arange(_FINER) / _FINER
         finer = (knots[:-1, None] + np.diff(knots)[:, None] * within).ravel()
         return FrameTransport(self._rate, np.append(finer, 1.0))
