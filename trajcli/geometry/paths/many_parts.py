@@ -136,11 +136,11 @@ class _Blends:
             self.lengths[panel + 1] - self.lengths[panel],
             local - self.lengths[panel],
         )
-        place, slope, bend = (_at(each, u) for each in (rows, slopes, _slope(slopes)))
+        position, slope, bend = (_at(each, u) for each in (rows, slopes, _slope(slopes)))
         speed = np.linalg.norm(slope, axis=-1, keepdims=True)
         first = slope / speed
         across = bend - (bend * first).sum(axis=-1, keepdims=True) * first
-        return np.stack([place, first, across / speed**2])
+        return np.stack([position, first, across / speed**2])
 
     def _panel(self, number: Indices, local: Array) -> Indices:
         """Return the index of the knot at or before each arc length, the last one of a blend left out."""
