@@ -116,6 +116,18 @@ def test_the_tightest_limit_is_the_largest_of_the_report(name: str) -> None:
         assert (0.0 if one is None else one.used) >= max(shares) * (1 - 2e-6)
         if move.tool is None and one is not None:
             assert one.used == pytest.approx(max(shares), rel=2e-6)
+        assert (move.binding is None) == (one is None)
+        if (
+            one is not None and move.binding is not None
+        ):  # and it is the one that the summary and the table name
+            assert (move.binding.joint, move.binding.quantity, move.binding.used) == (
+                one.joint,
+                one.quantity,
+                one.used,
+            )
+    if name == "weld_seam":  # along the seam its joints use little
+        of_tool = [move.binding for move in report.moves if move.binding and move.binding.joint is None]
+        assert [(each.quantity, round(each.used, 6)) for each in of_tool] == [("speed", 1.0)] * 2
 
 
 def test_moves_have_one_title_and_one_count(capfd: pytest.CaptureFixture[str]) -> None:

@@ -330,8 +330,8 @@ def _savings(savings: Sequence[SavingReport] | None, indent: str) -> Iterator[st
 def _speed(move: ExplainedMove) -> Iterator[str]:
     binding, reference = move.binding, move.reference
     if binding and binding.used > 0:
-        part = f"{100 * binding.used:.4g} % used"
-        yield f"  binding limit: {binding.quantity} of {binding.joint}, {part}"
+        name = f"{binding.quantity.replace('_', ' ')} of {binding.joint or 'the tool'}"
+        yield f"  binding limit: {name}, {100 * binding.used:.4g} % used"
     if move.at_limit:
         times = ", ".join(_at_limit(one) for one in move.at_limit[:_MOST_LIMITS])
         more = f" and {len(move.at_limit) - _MOST_LIMITS} more" if len(move.at_limit) > _MOST_LIMITS else ""

@@ -61,10 +61,10 @@ class ByPositionReport(ReportPart):
 
 
 class BindingReport(ReportPart):
-    """The limit that a move uses most."""
+    """The limit of which a move uses most."""
 
-    joint: str
-    quantity: JointQuantity | Literal["velocity_by_position", "effort"]
+    joint: Annotated[str | None, Field(description="Null: the quantity is of the tool.")]
+    quantity: JointQuantity | Literal["velocity_by_position", "effort"] | ToolLimit
     used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
 
 

@@ -106,9 +106,3 @@ def _reason(plan: Plan) -> str:
     if stated:
         return f"those of {robot.name} count where the job says `limits: {{effort: robot}}`"
     return "no limit of effort is given"
-
-
-def most_used(plan: Plan, index: int) -> EffortReport | None:
-    """Return the effort of a move that uses most of its limit; None where none is limited."""
-    reports = [report for report in effort_reports(plan, index) or () if report.used is not None]
-    return max(reports, key=lambda report: report.used or 0.0, default=None)

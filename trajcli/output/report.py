@@ -43,6 +43,7 @@ from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan
+from trajcli.planning.tightest import tightest_of_move
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import joint_units
 from trajcli.version import __version__
@@ -148,7 +149,7 @@ def _steps(steps: AccelerationSteps, units: Mapping[str, str]) -> list[StepRepor
 
 
 def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport:
-    from trajcli.output.effort_report import effort_reports, most_used, mounted_report, payload_report
+    from trajcli.output.effort_report import effort_reports, mounted_report, payload_report
 
     move, span = plan.moves[index], plan.trajectory.spans[index]
     peaks = [
@@ -157,17 +158,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         for joint in range(len(move.robot.joints))
     ]
     of_tool = plan.verdict.tool_peaks[index]
-    used = [peak for peak in peaks if peak.used is not None and peak.quantity != "position"]
-    most = max(used, key=lambda peak: peak.used or 0.0, default=None)
-    binding = most and BindingReport(joint=most.joint, quantity=most.quantity, used=most.used or 0.0)
-    near = _by_position(plan, index)
-    nearest = max(near, key=lambda use: use.used or 0.0, default=None)
-    if nearest is not None and (binding is None or nearest.used > (binding.used or 0.0)):
-        binding = BindingReport(joint=nearest.joint, quantity="velocity_by_position", used=nearest.used)
-    effort = most_used(plan, index)
-    used_most = 0.0 if effort is None else effort.used or 0.0
-    if effort is not None and (binding is None or used_most > (binding.used or 0.0)):
-        binding = BindingReport(joint=effort.joint, quantity="effort", used=used_most)
+    near, tightest = _by_position(plan, index), tightest_of_move(plan, index)
     return MoveReport(
         index=span.index,
         planner=span.planner,
@@ -183,7 +174,8 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         efforts=effort_reports(plan, index),
         payload=payload_report(span.payload),
         mounted=mounted_report(plan, index),
-        binding=binding,
+        binding=tightest
+        and BindingReport(joint=tightest.joint, quantity=tightest.quantity, used=tightest.used),
         at_limit=at_limit_of(move, plan.verdict.peaks[index], plan.verdict.by_position[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),

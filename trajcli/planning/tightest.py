@@ -28,13 +28,20 @@ class Tightest:
 
     Attributes:
         span: The move.
-        name: The limit, such as "velocity of wrist_1_joint".
+        quantity: What is limited: "velocity", "velocity_by_position", "effort" or, of the tool, "speed".
+        joint: Whose limit it is; None for the tool's.
         used: Which part of it is used, for all t.
     """
 
     span: Span
-    name: str
+    quantity: str
+    joint: str | None
     used: float
+
+    @property
+    def name(self) -> str:
+        """The limit in words, such as "velocity of wrist_1_joint"."""
+        return f"{self.quantity.replace('_', ' ')} of {self.joint or 'the tool'}"
 
     @property
     def share(self) -> str:
@@ -54,29 +61,34 @@ def tightest_limit(plan: Plan) -> str:
 def tightest_of_moves(plan: Plan) -> Iterator[Tightest]:
     """Yield the limit of which each move uses most, of those that use any, in their order."""
     for index in range(len(plan.moves)):
-        best, name = 0.0, ""
-        for used, limit in _uses(plan, index):
-            if used > best * (1 + _SAME):
-                best, name = used, limit
-        if best > 0:
-            yield Tightest(plan.trajectory.spans[index], name, best)
+        if (one := tightest_of_move(plan, index)) is not None:
+            yield one
 
 
-def _uses(plan: Plan, index: int) -> Iterator[tuple[float, str]]:
-    """Yield the largest part of each kind of limit that a move uses, and its name."""
+def tightest_of_move(plan: Plan, index: int) -> Tightest | None:
+    """Return the limit of which a move uses most; None where it uses none. Of equal ones the first counts."""
+    best, found = 0.0, None
+    for used, sure, quantity, joint in _uses(plan, index):
+        if used * sure > best * (1 + _SAME):
+            best, found = used * sure, Tightest(plan.trajectory.spans[index], quantity, joint, used)
+    return found
+
+
+def _uses(plan: Plan, index: int) -> Iterator[tuple[float, float, str, str | None]]:
+    """Yield of each kind of limit the largest part that is used, what of it is sure, quantity and joint."""
     move, verdict = plan.moves[index], plan.verdict
     for order in (1, 2, 3):
         bounds, extremes = move.robot.limits.of_order(order), verdict.peaks[index][order]
         used = np.maximum(extremes.low / bounds[:, 0], extremes.high / bounds[:, 1])
         joint = int(used.argmax())
-        yield float(used[joint]), f"{QUANTITIES[order]} of {move.robot.joint_names[joint]}"
+        yield float(used[joint]), 1.0, QUANTITIES[order], move.robot.joint_names[joint]
     for use in verdict.by_position[index]:
-        yield use.used, f"velocity by position of {move.robot.joint_names[use.component]}"
+        yield use.used, 1.0, "velocity_by_position", move.robot.joint_names[use.component]
     effort, name = _effort(plan, index)
-    yield effort * (1 - _UNSURE), f"effort of {name}"
+    yield effort, 1.0 - _UNSURE, "effort", name
     of_tool = verdict.tool_peaks[index]
-    speed, name = _tool_speed(move) if of_tool is None else _tool_in_joint_space(move, of_tool)
-    yield speed * (1 - _UNSURE), f"{name} of the tool"
+    speed, quantity = _tool_speed(move) if of_tool is None else _tool_in_joint_space(move, of_tool)
+    yield speed, 1.0 - _UNSURE, quantity, None
 
 
 def _effort(plan: Plan, index: int) -> tuple[float, str]:
@@ -95,12 +107,11 @@ def _tool_speed(move: PlannedMove) -> tuple[float, str]:
     tool, limits = move.planned.tool, move.robot.limits.tcp
     if tool is None:
         return 0.0, "speed"
-    limit, name = (limits.angular_speed, "angular speed") if tool.pure_rotation else (limits.speed, "speed")
+    limit, name = (limits.angular_speed, "angular_speed") if tool.pure_rotation else (limits.speed, "speed")
     return float(peaks(tool.law, (1,))[0].magnitude[0]) / limit, name
 
 
 def _tool_in_joint_space(move: PlannedMove, peaks: Mapping[str, ToolPeak]) -> tuple[float, str]:
     """Return the largest part of a limit of the tool that is used, and the limit's name."""
     limits = move.robot.limits.tcp
-    used, name = max((peak.value / getattr(limits, name), name) for name, peak in peaks.items())
-    return used, name.replace("_", " ")
+    return max((peak.value / getattr(limits, name), name) for name, peak in peaks.items())
