@@ -378,6 +378,10 @@ def test_each_fault_that_is_planted_is_caught_by_name():
     smaller = replace(part, around=replace(part.around, zone=part.around.zone.scaled(1 / 1.02)))
     changed = replace(first, planned=replace(first.planned, parts=(*first.planned.parts[:-1], smaller)))
     assert findings(plan, [changed, second]) == {"zone"}
+    limits, promises = [m.robot.limits for m in plan.moves], [changed.promise, second.promise]
+    (left,) = verify(plan.trajectory, limits, promises).findings
+    assert (left.move, left.limit) == (0, 1.0)
+    assert left.value == pytest.approx(1.02, rel=1e-4)
     lower = replace(part.robot, limits=replace(part.robot.limits, velocity=part.robot.limits.velocity / 30))
     changed = replace(
         first, planned=replace(first.planned, parts=(*first.planned.parts[:-1], replace(part, robot=lower)))
