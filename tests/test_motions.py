@@ -62,6 +62,8 @@ def test_pictures_and_pages_are_those_of_the_commands(
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
     trajcli.plot(rows, tmp_path / "rows.png", joints=(), quantities=("q",))
     trajcli.view(rows, tmp_path / "rows.html", robot=JOB)
+    trajcli.view(JOB, tmp_path / "two.html", beside=rows, robot=JOB, compress=False)
+    assert '"other":{' in (tmp_path / "two.html").read_text(encoding="utf-8")
     assert (tmp_path / "rows.png").read_bytes()[1:4] == b"PNG"
     assert b"rows.csv" in (tmp_path / "rows.html").read_bytes()
 

@@ -1,5 +1,6 @@
 // The arm as a tree of frames: each Denavit-Hartenberg row is drawn by two cylinders, for d and for a.
 import { BoxGeometry, CylinderGeometry, Group, Matrix4, Mesh, MeshBasicMaterial, SphereGeometry, Vector3 } from 'three';
+import { partOf } from './meshes.js';
 
 const UP = new Vector3(0, 1, 0); // the axis of three's cylinders
 const CYLINDER = new CylinderGeometry(1, 1, 1, 28);
@@ -69,8 +70,9 @@ export class Arm {
     this.axes = [];
     this.joints = [];
     this.frames = frames;
+    this.meshes = robot.meshes ?? [];
     let parent = this.fixed(this.root, matrix(robot.base));
-    if (!robot.rows[0].prismatic) this.foot(parent);
+    if (!robot.rows[0].prismatic && !this.dress(parent, 0)) this.foot(parent);
     robot.rows.forEach((row, index) => {
       parent = this.link(parent, row, index);
     });
@@ -109,6 +111,13 @@ export class Arm {
     return node;
   }
 
+  /** Add the meshes that move with a row, 0 for the base; return whether there are any. */
+  dress(parent, row) {
+    const own = this.meshes.filter((mesh) => mesh.row === row);
+    if (own.length) parent.add(...own.map((mesh) => partOf(mesh, this.materials)));
+    return own.length > 0;
+  }
+
   foot(parent) {
     const radius = this.radius(0);
     parent.add(rod(this.materials.dark, [0, 0, -0.2 * radius], [0, 0, 0.35 * radius], 1.75 * radius));
@@ -116,6 +125,7 @@ export class Arm {
 
   link(parent, row, index) {
     const screw = new Matrix4().makeRotationX(row.alpha).setPosition(row.a, 0, 0);
+    if (row.beta) screw.multiply(new Matrix4().makeRotationY(row.beta));
     // Modified rows have their screw about x before the joint: its length a is a part of the link before.
     const before = row.modified ? this.fixed(parent, screw) : parent;
     const radius = this.radius(index);
@@ -127,10 +137,12 @@ export class Arm {
     turning.add(slide);
     const carried = new Group();
     turning.add(carried);
-    this.knuckle(row, index, before, turning);
-    if (!row.modified && row.a) carried.add(rod(this.materials.link, [0, 0, 0], [row.a, 0, 0], 0.8 * radius));
-    this.joints.push({ row, turning, carried, slide, radius: row.prismatic ? 0.55 * radius : 0.8 * radius });
     const end = row.modified ? carried : this.fixed(carried, screw);
+    const dressed = this.dress(end, index + 1);
+    if (dressed) turning.remove(slide);
+    else this.knuckle(row, index, before, turning);
+    if (!row.modified && row.a && !dressed) carried.add(rod(this.materials.link, [0, 0, 0], [row.a, 0, 0], 0.8 * radius));
+    this.joints.push({ row, turning, carried, slide, radius: row.prismatic ? 0.55 * radius : 0.8 * radius });
     this.showFrame(end);
     return end;
   }

@@ -44,3 +44,13 @@ def test_moves_have_one_count_and_one_title(name: str) -> None:
     assert {move["index"]: move["title"] for move in scene["moves"]} == titles
     assert f" · {count} · " in scene["subtitle"]
     assert sorted([*titles, *(mark["index"] for mark in scene["marks"])]) == list(entries)
+
+
+def test_a_remark_is_no_event() -> None:
+    plan = planned_example("weave")
+    assert plan.remarks
+    scene = scene_of_plan(plan)
+    assert len(scene["events"]) == len([event for event in plan.events if not event.is_internal])
+    for remark in plan.remarks:
+        assert any(remark.message in note for note in scene["notes"])
+        assert all(remark.message != event["message"] for event in scene["events"])

@@ -205,35 +205,51 @@ def plot(
 
 
 def view(
-    source: JobSource, output: str | Path, *, robot: str | Path | None = None, compress: bool = False
+    source: JobSource,
+    output: str | Path,
+    *,
+    beside: JobSource | None = None,
+    robot: str | Path | None = None,
+    compress: bool = False,
+    meshes: float = 0.5,
 ) -> None:
     """Write the page that plays a motion in any browser, as `trajcli view` does.
 
     Args:
         source: A plan, a job as `trajcli.plan` takes it, or the path of a file of rows.
         output: An HTML file; it appears whole or not at all.
-        robot: The arm that a file of rows moves: a name, a robot file, or a job.
+        beside: A second motion, to be played beside the first; as `source`.
+        robot: The arm that files of rows move: a name, a robot file, or a job.
         compress: Whether script and data are packed.
+        meshes: How long the visual meshes of a URDF may be, MB; with 0 none are drawn.
 
     Raises:
-        InputError: When the file does not fit.
+        InputError: When the file does not fit, or two motions are not of the same joints.
         PlanningError: When a move has no curve.
         FileError: When a file cannot be read or written.
     """
     from trajcli.player.page import page_of
 
-    with np.errstate(all="ignore"):
-        if _is_motion(source) or robot is not None:
-            from trajcli.player.recorded import scene_of_file
+    scene = _scene_of(source, robot, meshes)
+    if beside is not None:
+        from trajcli.player.compared import scene_of_two
 
-            scene = scene_of_file(str(source), None if robot is None else str(robot))
-        else:
-            from trajcli.player.scene import scene_of_plan
-
-            scene = scene_of_plan(_plan_of(source))
+        scene = scene_of_two(scene, _scene_of(beside, robot, meshes))
     page = page_of(scene, compress=compress)
     with whole_file(str(output)) as out:
         out.write(page)
+
+
+def _scene_of(source: JobSource, robot: str | Path | None, meshes: float) -> dict[str, Any]:
+    """Return what the page shows of a plan, a job, or a file of rows."""
+    with np.errstate(all="ignore"):
+        if _is_motion(source):
+            from trajcli.player.recorded import scene_of_file
+
+            return scene_of_file(str(source), None if robot is None else str(robot), meshes=meshes)
+        from trajcli.player.scene import scene_of_plan
+
+        return scene_of_plan(_plan_of(source), meshes)
 
 
 def batch(

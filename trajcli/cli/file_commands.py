@@ -134,6 +134,15 @@ class ViewCommand(Command):
             help="The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
         ),
     ] = None
+    meshes: Annotated[
+        float,
+        typer.Option(
+            "--meshes",
+            metavar="MB",
+            min=0,
+            help="Of a URDF: how long its visual meshes may be, simplified to that; with 0 none are drawn.",
+        ),
+    ] = 0.5
     override: Overrides = []
 
 

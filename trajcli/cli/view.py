@@ -14,6 +14,7 @@ from trajcli.cli.progress import progress
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import frozen
 from trajcli.player.page import page_of
+from trajcli.player.scene import BUDGET
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion
 from trajcli.streams.whole_file import identity, is_special, standard_output, whole_file
@@ -43,7 +44,7 @@ def run_view(options: ViewCommand) -> int:
         raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
     by = options.robot or next((n for n, job in zip(options.sources, jobs, strict=True) if job), None)
     shown = [
-        _shown_job(name, options) if job else _shown_file(name, by, options.output)
+        _shown_job(name, options) if job else _shown_file(name, by, options.output, options.meshes)
         for name, job in zip(options.sources, jobs, strict=True)
     ]
     return _written(shown, options)
@@ -59,7 +60,7 @@ def write_comparison(first: str, second: str, output: str, robot: str | None) ->
     from trajcli.player.compared import scene_of_two
 
     _check_output(output)
-    shown = [_shown_file(name, robot, output) for name in (first, second)]
+    shown = [_shown_file(name, robot, output, BUDGET) for name in (first, second)]
     page = page_of(scene_of_two(*(one.scene for one in shown)))
     _write(page, output)
     print_remark(f"{output} ({len(page) / 1e6:.2f} MB) plays both")
@@ -92,6 +93,8 @@ def _written(shown: Sequence[_Shown], options: ViewCommand) -> int:
     wrong = [one.problems for one in shown if one.problems is not None]
     after = "; the page shows the findings" if wrong and not holds_motion(options.sources[0]) else ""
     print_remark(f"{'; '.join(one.said for one in shown)}{_where(page, options.output)}{after}", verdict=True)
+    for text in dict.fromkeys(text for one in shown for text in one.scene["remarks"]):
+        print_remark(f"  {text}")
     if wrong:
         raise VerificationError(*(problem for problems in wrong for problem in problems()))
     return 0
@@ -106,7 +109,7 @@ def _shown_job(name: str, options: ViewCommand) -> _Shown:
     _check_inputs_stay(options.output, [path for _, path in files_of(loaded.document)])
     with progress(), np.errstate(all="ignore"):  # what is not finite is for the checks to find
         plan = plan_of(loaded)
-    scene = scene_of_plan(plan)
+    scene = scene_of_plan(plan, options.meshes)
     if plan.verdict.passed:
         return _Shown(scene, f"{loaded.name}: verified, {plan.trajectory.duration:.6g} s", None)
     from trajcli.output.report import verification_error
@@ -116,13 +119,13 @@ def _shown_job(name: str, options: ViewCommand) -> _Shown:
     )
 
 
-def _shown_file(name: str, robot: str | None, output: str | None) -> _Shown:
+def _shown_file(name: str, robot: str | None, output: str | None, meshes: float) -> _Shown:
     from trajcli.player.recorded import scene_of_file
 
     _check_inputs_stay(output, [name])
     opened = ByteSource(name)
     checked = None if robot is None else _judged(opened, robot)
-    scene = scene_of_file(opened, robot, checked)
+    scene = scene_of_file(opened, robot, checked, meshes)
     said = f"{scene['title']}: {scene['verdict']['text']}, {scene['subtitle']}"
     if checked is None or isinstance(checked, str) or checked.judgement.passed:
         return _Shown(scene, said, None)

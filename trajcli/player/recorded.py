@@ -16,7 +16,16 @@ from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile
 from trajcli.kinematics.robot import JointType, Robot
 from trajcli.player.rows import ORDERS, DrawnRows, rows_of_samples
-from trajcli.player.scene import geometry_of, joints_in_units, limits_of, opening, order_of, waypoints_of
+from trajcli.player.scene import (
+    BUDGET,
+    dressed,
+    geometry_of,
+    joints_in_units,
+    limits_of,
+    opening,
+    order_of,
+    waypoints_of,
+)
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.forward import refuse_far
 from trajcli.streams.byte_source import ByteSource
@@ -31,7 +40,10 @@ _SUFFIXES: dict[str | None, JointType] = {"deg": "revolute", "mm": "prismatic"}
 
 
 def scene_of_file(
-    source: str | ByteSource, robot_name: str | None = None, checked: CheckedFile | str | None = None
+    source: str | ByteSource,
+    robot_name: str | None = None,
+    checked: CheckedFile | str | None = None,
+    meshes: float = BUDGET,
 ) -> dict[str, Any]:
     """Return the scene of a file with columns t, q1.. and perhaps qd1.., qdd1.., qddd1.., move.
 
@@ -39,6 +51,7 @@ def scene_of_file(
         source: Its path; "-" is standard input.
         robot_name: The arm: of the catalogue, a robot file, or a job.
         checked: The judgement of the file, or why there is none; None where nobody asked for one.
+        meshes: How long the visual meshes of the arm's URDF may be, MB; with 0 none are shown.
 
     Raises:
         InputError: When a column is missing or does not fit the robot, a time does not increase, or there is
@@ -55,7 +68,9 @@ def scene_of_file(
     facts = [f"{times.size} row{'s' * (times.size != 1)}", f"{times[-1] - times[0]:.6g} s"]
     waypoints = [(float(times[row]), values["q"][row], "") for row in _ends(moves, times.size)]
     limits = [] if robot is None else [(float(times[0]), float(times[-1]), robot.limits)]
-    return {
+    from trajcli.player.meshes import meshes_of_robot
+
+    scene = {
         "version": 1,
         "title": utf8(Path(table.file).name),
         "subtitle": " · ".join(facts if robot is None else [robot.name, *facts]),
@@ -70,6 +85,7 @@ def scene_of_file(
         **{key: [] for key in ("events", "steps", "loads", "marks", "zones", "signals")},
         "notes": [*_judgement_notes(checked), *_notes(rows, kept, times)],
     }
+    return dressed(scene, *meshes_of_robot(robot_name, meshes))
 
 
 def _judgement(checked: CheckedFile | str | None, units: Units, start: float) -> dict[str, Any]:

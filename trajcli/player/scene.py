@@ -23,14 +23,24 @@ from trajcli.trajectory import Span, Trajectory
 from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, typeset, unit_name
 from trajcli.version import __version__
 
+BUDGET = 0.5
+"""MB that the visual meshes of a page take."""
 _MOST_WAYPOINTS = 40
 _MOST_STEPS = 100
 _SAME = 1e-4  # rad or m: waypoints that are nearer than this are one
 _MADE_BY = f"Made by trajcli {__version__}"
 
 
-def scene_of_plan(plan: Plan) -> dict[str, Any]:
-    """Return the scene of a plan, verified or not, as the player reads it: SI, and the units to show."""
+def scene_of_plan(plan: Plan, meshes: float = BUDGET) -> dict[str, Any]:
+    """Return the scene of a plan, verified or not, as the player reads it: SI, and the units to show.
+
+    Args:
+        plan: The plan.
+        meshes: How long the visual meshes of a URDF may be, MB; with 0 none are shown.
+
+    Raises:
+        FileError: When the URDF of the job cannot be read any more.
+    """
     loaded, trajectory, verdict = plan.loaded, plan.trajectory, plan.verdict
     spans = [span for span in trajectory.spans if span.duration > 0]
     when = [finding.time for finding in verdict.findings if finding.time is not None]
@@ -41,7 +51,7 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
     )
     moves = _counted(loaded.move_count, "move")
     names, types = trajectory.joint_names, trajectory.joint_types
-    return {
+    scene = {
         "version": 1,
         "title": loaded.name,
         "subtitle": f"{loaded.robot.name} · {moves} · {trajectory.duration:.6g} s",
@@ -58,10 +68,19 @@ def scene_of_plan(plan: Plan) -> dict[str, Any]:
         "findings": [_finding(plan, finding) for finding in verdict.findings],
         "causes": causes,
         "opens_at": opening(verdict.findings, causes),
-        "events": [_event(plan, event) for event in (*plan.events, *plan.remarks) if not event.is_internal],
+        "events": [_event(plan, event) for event in plan.events if not event.is_internal],
         "steps": [_step(plan, k) for k in range(min(len(verdict.steps), _MOST_STEPS))],
         "notes": list(_notes(plan)),
     }
+    from trajcli.player.meshes import meshes_of_job
+
+    return dressed(scene, *meshes_of_job(loaded, meshes))
+
+
+def dressed(scene: dict[str, Any], meshes: list[dict[str, Any]], remarks: list[str]) -> dict[str, Any]:
+    """Return a scene whose arm has meshes, with remarks on them, which stand among its notes, too."""
+    robot = scene["robot"] and {**scene["robot"], **({"meshes": meshes} if meshes else {})}
+    return {**scene, "robot": robot, "notes": [*scene["notes"], *remarks], "remarks": remarks}
 
 
 def _rows_and_loads(
@@ -132,6 +151,7 @@ def geometry_of(
     table = [
         {
             **{key: getattr(joint, key) for key in ("theta", "d", "a", "alpha", "sign")},
+            **({"beta": joint.beta} if joint.beta else {}),
             "prismatic": joint.type == "prismatic",
             "modified": robot.convention == "modified",
             "range": between,
@@ -308,8 +328,11 @@ def _step(plan: Plan, index: int) -> dict[str, Any]:
 
 
 def _notes(plan: Plan) -> Iterator[str]:
-    """Yield what was not judged."""
+    """Yield remarks, and what was not judged."""
     verdict = plan.verdict
+    for remark in plan.remarks:
+        said = _event(plan, remark)
+        yield f"{said['label']} {said['message']}".strip()
     if plan.unchecked:
         yield f"Without a limit, not checked: {plan.unchecked}."
     if verdict.unchecked_of_tool:

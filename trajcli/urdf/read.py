@@ -1,7 +1,8 @@
 """Links and joints of a file in the Unified Robot Description Format, each element with its place.
 
 Only what a chain needs is interpreted, and only when it is asked for: a flaw in a mesh or in a joint beyond
-the tip does no harm. No other file is opened: `package://` stands in meshes alone, which are passed over.
+the tip does no harm. No other file is opened: `package://` stands in meshes alone, which are passed over but
+where a picture is made.
 
 Source: the URDF XML specification of urdfdom (https://wiki.ros.org/urdf/XML).
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 import codecs
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import NamedTuple
 from xml.parsers import expat
@@ -79,6 +80,7 @@ class UrdfDocument:
         name: Of the robot.
         links: By name, in the order of the file.
         joints: By name, in the order of the file.
+        materials: Those of the whole robot by name, where visuals are asked for.
     """
 
     file: str
@@ -86,6 +88,7 @@ class UrdfDocument:
     name: str
     links: Mapping[str, Element]
     joints: Mapping[str, JointElement]
+    materials: Mapping[str, Element]
 
     def place(self, element: Element, attribute: str | None = None) -> Place:
         """Return where an element stands, or an attribute of it that is on the same line."""
@@ -140,12 +143,13 @@ class UrdfDocument:
         return value
 
 
-def parse_urdf(data: bytes, file: str) -> UrdfDocument:
+def parse_urdf(data: bytes, file: str, *, visuals: bool = False) -> UrdfDocument:
     """Return the links and joints of a URDF.
 
     Args:
         data: The whole file, of at most `MAX_BYTES`.
         file: Its path, for messages.
+        visuals: Whether the visuals of links, and materials, are kept.
 
     Raises:
         InputError: When it is no XML or no URDF, with line and column: also for a DOCTYPE, xacro that is not
@@ -157,9 +161,10 @@ def parse_urdf(data: bytes, file: str) -> UrdfDocument:
     blank = len(data) - len(data.lstrip(b" \t\r\n"))  # some files begin with an empty line
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     lines = tuple(data.decode("utf-16" if wide else "utf-8-sig", "replace").splitlines())
-    root = _Builder(file, lines, data[:blank].count(b"\n")).parse(data[blank:])
+    skipped = [name for name in _SKIPPED if not visuals or name not in ("visual", "material")]
+    root = _Builder(file, lines, data[:blank].count(b"\n"), skipped).parse(data[blank:])
     stem = utf8(PurePath(file).stem)
-    empty = UrdfDocument(file, lines, root.attributes.get("name") or stem, {}, {})
+    empty = UrdfDocument(file, lines, root.attributes.get("name") or stem, {}, {}, {})
     if root.name != "robot":
         raise empty.refused(f"expected <robot>, got <{root.name}>: this is no URDF", root)
     links: dict[str, Element] = {}
@@ -171,7 +176,8 @@ def parse_urdf(data: bytes, file: str) -> UrdfDocument:
             name = _unique_name(empty, element, joints)
             joints[name] = JointElement(name, *_joint_words(empty, element, name), element)
     _check_links(empty, links, joints)
-    return UrdfDocument(file, lines, empty.name, links, joints)
+    materials = {item.attributes.get("name", ""): item for item in root.inside if item.name == "material"}
+    return UrdfDocument(file, lines, empty.name, links, joints, materials)
 
 
 def _unique_name(document: UrdfDocument, element: Element, taken: Mapping[str, object]) -> str:
@@ -223,8 +229,10 @@ def _check_links(
 class _Builder:
     """Handlers of expat that build the elements of links and joints."""
 
-    def __init__(self, file: str, lines: tuple[str, ...], skipped_lines: int) -> None:
-        self._file, self._lines, self._skipped = file, lines, skipped_lines
+    def __init__(
+        self, file: str, lines: tuple[str, ...], skipped_lines: int, left_out: Sequence[str]
+    ) -> None:
+        self._file, self._lines, self._skipped, self._left_out = file, lines, skipped_lines, left_out
         self._open: list[Element | None] = []
         self._root: Element | None = None
         self._parser = expat.ParserCreate()  # without namespaces: prefixes that are not declared do no harm
@@ -267,7 +275,7 @@ class _Builder:
         above = self._open[-1] if self._open else None
         if not self._open:
             self._root = element
-        elif above is None or name in _SKIPPED:
+        elif above is None or name in self._left_out:
             self._open.append(None)
             return
         else:

@@ -147,17 +147,24 @@ def robot_of_urdf(
     path = serial_path(document, root, tip)
     moving = [joint for joint in path.joints if joint.moves]
     properties = [joint_properties(document, joint, soft=soft) for joint in moving]
-    origins = [
-        origin_of(document, joint.element, None if exact else _angles(document, joint)[1])
-        for joint in path.joints
-    ]
-    axes, end = _axes(document, path, origins)
-    table = dh_table(axes, end)
+    origins, table = origins_and_table(document, path, exact=exact)
     notes = [note for each in properties for note in each.notes]
     inertias = _inertias(document, path, origins, table, notes)
     robot = _robot(document, moving, table, properties, inertias)
     snapped = () if exact else tuple(_snapped(document, path, origins, properties))
     return UrdfRobot(robot, path.root, path.tip, path.other_tips, path.other_roots, snapped, tuple(notes))
+
+
+def origins_and_table(
+    document: UrdfDocument, path: SerialPath, *, exact: bool
+) -> tuple[list[Array], DhTable]:
+    """Return the pose of each joint of a chain in its parent, (4, 4), and the rows that they come to."""
+    origins = [
+        origin_of(document, joint.element, None if exact else _angles(document, joint)[1])
+        for joint in path.joints
+    ]
+    axes, end = _axes(document, path, origins)
+    return origins, dh_table(axes, end)
 
 
 def _angles(document: UrdfDocument, joint: JointElement) -> tuple[Array, Array]:
@@ -241,14 +248,28 @@ def _inertias(
 
     What is not of the chain, such as a gripper, is fixed where its joints are at zero.
     """
+    behind = links_of_rows(document, path, origins, table)[1:]
+    return [link_inertia(document, parts, notes) for parts in behind]
+
+
+def links_of_rows(
+    document: UrdfDocument, path: SerialPath, origins: Sequence[Array], table: DhTable
+) -> list[list[tuple[str, Array]]]:
+    """Return the links that move with the base, then with each row: names, and poses (4, 4) in its frame.
+
+    What is not of the chain, such as a gripper, is fixed where its joints are at zero.
+    """
     below: dict[str, list[JointElement]] = {}
     for joint in document.joints.values():
         below.setdefault(joint.parent, []).append(joint)
     moving = [joint for joint in path.joints if joint.moves]
     of_chain = {joint.name: origin for joint, origin in zip(path.joints, origins, strict=True)}
-    inertias: list[LinkInertia | None] = []
-    for first, frame in zip(moving, table.links, strict=True):
-        parts, links = [], [(first.child, frame)]
+    above = np.asarray(np.linalg.inv(table.base), float)
+    starts = [(path.root, above)]
+    starts += [(joint.child, frame) for joint, frame in zip(moving, table.links, strict=True)]
+    rows: list[list[tuple[str, Array]]] = []
+    for start in starts:
+        parts, links = list[tuple[str, Array]](), [start]
         while links:
             link, pose = links.pop()
             parts.append((link, pose))
@@ -257,8 +278,8 @@ def _inertias(
                     origin = of_chain.get(joint.name)
                     origin = origin_of(document, joint.element) if origin is None else origin
                     links.append((joint.child, pose @ origin))
-        inertias.append(link_inertia(document, parts, notes))
-    return inertias
+        rows.append(parts)
+    return rows
 
 
 def _snapped(
