@@ -43,6 +43,7 @@ class _Seen(NamedTuple):
     peaks: tuple[float, ...]
     duration: float
     rounding: list[float]
+    missed: list[float]
 
 
 @frozen
@@ -73,16 +74,15 @@ class PhaseChain:
     def _seen(self) -> _Seen:
         """What the phases do, seen once."""
         states, leftover, driving = self._walk_of_third_order() if self.order == _ORDER else self._walk()
-        peaks = tuple(
-            max(*values, -min(values), wanted, -wanted)  # NaN is larger than nothing
-            for values, wanted in zip(zip(*states, strict=True), self.final, strict=True)
-        )
+        columns = zip(zip(*states, strict=True), self.final, strict=True)
+        peaks = [max(*values, -min(values), to, -to) for values, to in columns]  # NaN is larger than nothing
         duration, sizes = _total(self.durations), [*peaks]
         if len(sizes) > 1:
             sizes[0] = max(sizes[0], sizes[1] * duration)
         if len(sizes) > 2:
             sizes[1] = max(sizes[1], sizes[2] * math.fsum(driving))
-        return _Seen(states, leftover, peaks, duration, [size or 1.0 for size in sizes])
+        missed = [value - wanted for value, wanted in zip(states[-1], self.final, strict=True)]
+        return _Seen(states, leftover, tuple(peaks), duration, [size or 1.0 for size in sizes], missed)
 
     def _walk(self) -> _Walk:
         """Return the states before each phase and at the end, and what is seen at cruises and beside them.
@@ -270,10 +270,11 @@ class PhaseChain:
 
     def _residual(self, scales: Sequence[float], duration: float | None) -> list[float]:
         """Return by how much the end, the cruises and the duration miss what they should be."""
-        states, leftover = self._seen[:2]
-        ends = zip(states[-1], self.final, scales, strict=True)
-        miss = [(value - wanted) / scale for value, wanted, scale in ends if wanted == wanted]
-        miss += [value / scales[-1] for value in leftover]
+        seen = self._seen
+        ends = zip(seen.missed, self.final, scales, strict=True)
+        miss = [value / scale for value, wanted, scale in ends if wanted == wanted]
+        if seen.leftover:
+            miss += [value / scales[-1] for value in seen.leftover]
         if duration is not None:
             miss.append(self.duration / duration - 1)
         return miss
@@ -321,7 +322,8 @@ def _total(values: Sequence[float]) -> float:
 
 def _largest(values: Sequence[float]) -> float:
     """Return the largest magnitude; NaN where there is one, 0 where there is none."""
-    return math.nan if any(map(math.isnan, values)) else max(map(abs, values), default=0.0)
+    largest = max(map(abs, values), default=0.0)
+    return math.nan if any(value != value for value in values) else largest
 
 
 def _rounded_breaks(durations: Sequence[float], end: float) -> list[float]:

@@ -244,7 +244,7 @@ def _double_s(problem: BoundaryProblem, duration: float | None) -> PhaseProfile 
     displacement = problem.displacement
     (lowest, highest), (low, high), jerks = problem.bounds.tolist()
     sizes = abs(displacement), highest if displacement > 0 else -lowest, high, min(-jerks[0], jerks[1])
-    if low != -high or not all(1 / _COMMON < size < _COMMON for size in sizes):
+    if low != -high or not (min(sizes) > 1 / _COMMON and max(sizes) < _COMMON):
         return None
     from trajcli.curves.rest_to_rest import DoubleS, double_s_of, fastest_double_s
 
