@@ -158,10 +158,18 @@ def _joint_values(table: Table, columns: Sequence[Column], robot: Robot | None) 
         if [column.joint for column in found] == list(range(joints)):
             if robot is not None and name != EFFORT:
                 _check_units(table, found, robot)
-            each = np.stack([table.column(column.name) * column.factor for column in found], axis=1)
-            values[name] = each
+            values[name] = _values(table, found)
     refuse_far(values["q"], table.file)
     return values
+
+
+def _values(table: Table, columns: Sequence[Column]) -> Array:
+    """Return columns of a file in SI, (N, n): without a copy where they stand so in it."""
+    first, factors = table.names.index(columns[0].name), {column.factor for column in columns}
+    names = table.names[first : first + len(columns)]
+    if factors == {1.0} and names == tuple(column.name for column in columns):
+        return table.columns[:, first : first + len(columns)]
+    return np.stack([table.column(column.name) * column.factor for column in columns], axis=1)
 
 
 def _joint_count(table: Table, columns: Sequence[Column], robot: Robot | None) -> int:

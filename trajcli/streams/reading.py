@@ -10,7 +10,7 @@ import numpy as np
 from trajcli.errors import InputError, utf8
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, TimedRows, in_columns
-from trajcli.streams.table import Table
+from trajcli.streams.table import Table, joined_blocks
 from trajcli.streams.whole_file import is_special
 
 _ALL_DECIMALS = 17  # of a float64
@@ -56,7 +56,7 @@ def read_table(path: str | Path | ByteSource, topic: str | None = None) -> Table
     of_log = topic is not None and format_of_rows(source) == "mcap"
     rows = open_rows_of(source, topic=topic if of_log else None)
     every = range(len(rows.named.names))
-    columns = np.concatenate(list(rows.blocks(every, ())))
+    columns = joined_blocks(rows.blocks(every, ()))
     decimals = rows.decimals(every)
     return Table(
         rows.named.names, columns, np.where(decimals == EXACT, _ALL_DECIMALS, decimals), rows.named.file
