@@ -146,7 +146,9 @@ class IkCommand(NumbersCommand):
     pose: Annotated[
         str | None,
         typer.Option(
-            "--pose", metavar="POSE", help="T_world_tcp as YAML or @FILE; what it leaves out is free."
+            "--pose",
+            metavar="POSE",
+            help="T_world_tcp as YAML or @FILE; what it leaves out is free. joints: {NAME: X} pins joints.",
         ),
     ] = None
     near: Annotated[

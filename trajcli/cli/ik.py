@@ -13,7 +13,7 @@ from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.language.targets import ik_target
 from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
-from trajcli.queries.inverse import answer_reports, find_answers, require_answer
+from trajcli.queries.inverse import Wanted, answer_reports, find_answers, require_answer
 
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import IkCommand
@@ -37,15 +37,15 @@ def run_ik(options: IkCommand) -> int:
         _remark_on(arm, near)
     if options.pose is None:
         return _stream(arm, near, options)
-    asked = inline_target(options.pose, "--pose", arm.units)
-    target = ik_target(asked)
-    solutions, chosen = find_answers(arm, target, asked.configuration, near, options.tolerance)
+    asked = inline_target(options.pose, "--pose", arm.units, arm.robot)
+    target = Wanted(ik_target(asked), asked.pins, asked.configuration)
+    solutions, chosen = find_answers(arm, target, near, options.tolerance)
     reports = answer_reports(arm, solutions, chosen, target, near, every=options.every, turns=options.turns)
     if options.as_json:
         print_json(reports)
     elif reports:
         print_lines(_lines(arm, solutions, reports))
-    require_answer(arm, solutions, chosen, asked.configuration, target)
+    require_answer(arm, solutions, chosen, target)
     return 0
 
 

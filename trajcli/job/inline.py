@@ -13,11 +13,11 @@ from trajcli.errors import InputError, Problem
 from trajcli.job.messages import problems_of
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import parse_document, read_document
-from trajcli.kinematics.robot import Payload
+from trajcli.kinematics.robot import Payload, Robot
 from trajcli.language.dynamics import PayloadSpec
 from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext, within_bounds
 from trajcli.language.poses import Pose
-from trajcli.language.targets import PoseFields
+from trajcli.language.targets import AskedPose
 from trajcli.units import (
     Quantity,
     UnitError,
@@ -85,23 +85,25 @@ def inline_pose(word: str, name: str, units: Units) -> Array:
     return read_at(document, units, Pose(name).read)
 
 
-def inline_target(word: str, name: str, units: Units) -> PoseFields:
+def inline_target(word: str, name: str, units: Units, robot: Robot) -> AskedPose:
     """Return the target that a word describes; what it leaves out is free.
 
     Args:
         word: YAML, or @FILE.
         name: What the word is called in messages.
         units: Of plain numbers.
+        robot: Whose joints may be pinned.
 
     Raises:
         InputError: When it is no pose, or says nothing.
         FileError: When the file cannot be read.
     """
     document = inline_document(word, name)
+    context = ReadingContext(units, robot.joint_names, robot.joint_types)
     try:
-        target = PoseFields.model_validate(document.plain(), context=ReadingContext(units))
+        target = AskedPose.model_validate(document.plain(), context=context)
     except ValidationError as error:
-        raise InputError(*problems_of(error, PoseFields, document)) from None
+        raise InputError(*problems_of(error, AskedPose, document)) from None
     if not target.gives_pose:
         hint = "give a position, an orientation or both, such as {xyz: [0.4, 0, 0.3], rpy: [0, 0, 0]}"
         raise InputError(Problem("the target fixes nothing", hint, document.place(())))

@@ -388,6 +388,24 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
         )
 
 
+class AskedPose(PoseFields):
+    """A pose that joint values are asked for, and joints that are pinned beside it."""
+
+    joints: JointPositions | None = None
+
+    @model_validator(mode="after")
+    def _joints_are_pinned(self) -> AskedPose:
+        if self.joints is not None and not isinstance(self.joints, NamedValues):
+            text = "beside a pose `joints` pins some joints by name, and leaves others to be solved"
+            raise refuse([(("joints",), text, "such as {joint: value}")])
+        return self
+
+    @property
+    def pins(self) -> dict[int, float]:
+        """Values of the joints that are pinned, by index, rad or m."""
+        return self.joints.by_index if isinstance(self.joints, NamedValues) else {}
+
+
 def ik_target(fields: PoseFields) -> IkTarget:
     """Return the coordinates of the tcp's pose that a target fixes.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -163,6 +163,15 @@ def _pose(plan: Plan, index: int | None) -> PoseReport | None:
     return None if pose is None else in_units(_resolved(pose, plan, robot), plan.loaded.units)
 
 
+def _without_pins(robot: Robot, joints: Array, pins: Mapping[int, float]) -> tuple[Robot, Array]:
+    """Return the arm of the joints that are not pinned, and their values (1, k)."""
+    if not pins:
+        return robot, joints[None]
+    from trajcli.kinematics.inverse.pinned_joints import without_pinned
+
+    return without_pinned(robot, pins), np.delete(joints, list(pins))[None]
+
+
 def _resolved(pose: ResolvedPose, plan: Plan, robot: Robot) -> PoseReport:
     """Return how a pose of the tool of an arm was reached, in SI."""
     from trajcli.kinematics.inverse.target import ranks
@@ -170,13 +179,15 @@ def _resolved(pose: ResolvedPose, plan: Plan, robot: Robot) -> PoseReport:
 
     solutions, joints = pose.solutions, pose.joints
     asked, units = asked_names(pose.target.configuration), joint_units(robot.joint_types)
-    here, nearby = ranks(robot, joints[None], pose.ik_target)
+    pins = {} if pose.target.pinned is None else pose.target.pinned.by_index
+    here, nearby = ranks(*_without_pins(robot, joints, pins), pose.ik_target)
     free = None
     if solutions.free[pose.branch].any():
         from trajcli.queries.arm import ArmInUnits
         from trajcli.queries.inverse import free_directions
 
-        free = _plain(next(free_directions(ArmInUnits(robot, plan.loaded.units), joints, pose.ik_target)))
+        arm = ArmInUnits(robot, plan.loaded.units)
+        free = _plain(next(free_directions(arm, joints, pose.ik_target, pins)))
     return PoseReport(
         joints=_plain(joints),
         units=units,

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import asdict, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.inverse.joint_turns import all_turns
+from trajcli.kinematics.inverse.pinned_joints import solve_pinned, without_pinned
 from trajcli.kinematics.inverse.solutions import Solutions, check_reachable
-from trajcli.kinematics.inverse.solve import reached_if_turned, solve
+from trajcli.kinematics.inverse.solve import reached_if_turned
 from trajcli.kinematics.inverse.target import IkTarget, held_jacobian, rank_of, ranks
 from trajcli.language.poses import Configuration
 
@@ -21,35 +23,46 @@ if TYPE_CHECKING:
     from trajcli.queries.arm import ArmInUnits
 
 
+@frozen
+class Wanted:
+    """What joint values are asked for.
+
+    Attributes:
+        target: What is fixed of the tcp's pose.
+        pins: Values of joints that are pinned, by index, rad or m.
+        configuration: The names that a branch must have.
+    """
+
+    target: IkTarget
+    pins: Mapping[int, float] = field(default_factory=dict)
+    configuration: Configuration | None = None
+
+
 def find_answers(
-    arm: ArmInUnits,
-    target: IkTarget,
-    configuration: Configuration | None,
-    near: Array | None,
-    tolerance: float,
+    arm: ArmInUnits, wanted: Wanted, near: Array | None, tolerance: float
 ) -> tuple[Solutions, Flags]:
     """Return all branches of one target, and which of them are answers as it is asked for, shape (branches,).
 
     Args:
         arm: The arm.
-        target: One target.
-        configuration: The names that a branch must have.
+        wanted: One target.
         near: Joint values (n,), rad or m; zero if absent.
         tolerance: What an answer may miss the target by, m and rad.
 
     Raises:
         InputError: When a choice is asked for that the arm does not have for this target.
+        PlanningError: When every joint is pinned.
     """
-    solutions = solve(arm.robot, target, near, tolerance)
-    wanted = _named(configuration)
-    for choice in wanted:
+    solutions = solve_pinned(arm.robot, wanted.target, wanted.pins, near, tolerance)
+    names = _named(wanted.configuration)
+    for choice in names:
         if getattr(solutions.names[0], choice) is None:
             raise InputError(
                 f"{arm.robot.name} has no choice of {choice} for this target: {solutions.method.reason}",
                 hint=f"leave {choice} out of `configuration`",
             )
-    chosen = solutions.valid & solutions.named(**wanted)
-    flags = None if configuration is None else configuration.flags
+    chosen = solutions.valid & solutions.named(**names)
+    flags = None if wanted.configuration is None else wanted.configuration.flags
     return solutions, chosen if flags is None else chosen & flags.met(arm.robot, solutions.joints)
 
 
@@ -62,7 +75,7 @@ def answer_reports(
     arm: ArmInUnits,
     solutions: Solutions,
     chosen: Flags,
-    target: IkTarget,
+    wanted: Wanted,
     near: Array | None = None,
     *,
     every: bool = False,
@@ -79,7 +92,7 @@ def answer_reports(
         arm: The arm.
         solutions: All branches.
         chosen: Which of them to return, shape (branches,).
-        target: What was asked for.
+        wanted: What was asked for; pinned joints neither move nor turn.
         near: Joint values (n,): the nearest answer comes first.
         every: Whether answers outside the limits count too.
         turns: Whether every full turn that the limits allow is an answer of its own.
@@ -87,12 +100,14 @@ def answer_reports(
     usable = np.flatnonzero(chosen if every else chosen & solutions.within_limits)
     if not len(usable):
         return []
-    here, nearby = ranks(arm.robot, solutions.joints[usable], target)
+    others = [joint for joint in range(len(arm.robot.joints)) if joint not in wanted.pins]
+    moving = without_pinned(arm.robot, wanted.pins) if wanted.pins else arm.robot
+    here, nearby = ranks(moving, solutions.joints[usable][:, others], wanted.target)
     reports = [
-        (joints, _answer(arm, solutions, branch, joints, target, lost))
+        (joints, _answer(arm, solutions, branch, joints, wanted, lost))
         for branch, lost in zip(usable.tolist(), (here < nearby).tolist(), strict=True)
         for joints in (
-            all_turns(arm.robot, solutions.joints[branch]) if turns else [solutions.joints[branch]]
+            _turned(arm, solutions.joints[branch], wanted) if turns else [solutions.joints[branch]]
         )
     ]
     if near is not None:
@@ -100,13 +115,13 @@ def answer_reports(
     return [answer for _, answer in reports]
 
 
-def require_answer(
-    arm: ArmInUnits,
-    solutions: Solutions,
-    chosen: Flags,
-    configuration: Configuration | None,
-    target: IkTarget,
-) -> None:
+def _turned(arm: ArmInUnits, joints: Array, wanted: Wanted) -> Array:
+    """Return joint values (n,) in every turn that the limits allow, (k, n); pinned ones stay."""
+    turned, pins = all_turns(arm.robot, joints), list(wanted.pins)
+    return np.asarray(turned[(turned[:, pins] == joints[pins]).all(axis=1)])
+
+
+def require_answer(arm: ArmInUnits, solutions: Solutions, chosen: Flags, wanted: Wanted) -> None:
     """Do nothing when one of the chosen branches is within the limits.
 
     Raises:
@@ -114,7 +129,7 @@ def require_answer(
     """
     if (chosen & solutions.within_limits).any():
         return
-    named = " ".join(_named(configuration).values())
+    named = " ".join(_named(wanted.configuration).values())
     if solutions.valid.any() and named:
         others = [
             str(name) for name, fine in zip(solutions.names, solutions.within_limits, strict=True) if fine
@@ -125,14 +140,14 @@ def require_answer(
             hint=f"within the limits: {'; '.join(others)}" if others else "no other branch is inside either",
         )
     try:
-        turning_helps = bool(solutions.valid.any()) or reached_if_turned(arm.robot, target)
+        turning_helps = bool(solutions.valid.any()) or reached_if_turned(arm.robot, wanted.target)
         check_reachable(arm.robot, solutions, turning_helps=turning_helps)
     except PlanningError as error:
         raise error.said_by(arm.say) from None
 
 
 def _answer(
-    arm: ArmInUnits, solutions: Solutions, branch: int, joints: Array, target: IkTarget, singular: bool
+    arm: ArmInUnits, solutions: Solutions, branch: int, joints: Array, wanted: Wanted, singular: bool
 ) -> dict[str, Any]:
     from trajcli.queries.pose import plain
 
@@ -145,16 +160,27 @@ def _answer(
         "singular": singular,
     }
     if solutions.free[branch].any():
-        report["free_direction"] = plain(next(free_directions(arm, joints, target)))
+        report["free_direction"] = plain(next(free_directions(arm, joints, wanted.target, wanted.pins)))
     return report
 
 
-def free_directions(arm: ArmInUnits, joints: Array, target: IkTarget) -> Iterator[Array]:
-    """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose."""
-    _, values, right = np.linalg.svd(held_jacobian(arm.robot, joints[None], target)[0])
+def free_directions(
+    arm: ArmInUnits, joints: Array, target: IkTarget, pins: Collection[int] = ()
+) -> Iterator[Array]:
+    """Yield unit vectors (n,) of joint values, in the user's units, that leave what is fixed of the pose.
+
+    Args:
+        arm: The arm.
+        joints: Where it stands, (n,), rad or m.
+        target: What is fixed of the pose.
+        pins: Indices of joints that stay.
+    """
+    others = [joint for joint in range(len(joints)) if joint not in pins]
+    _, values, right = np.linalg.svd(held_jacobian(arm.robot, joints[None], target)[0][:, others])
     from trajcli.queries.jacobian import simplest
 
-    rank = min(int(rank_of(values)), len(joints) - 1)
+    rank = min(int(rank_of(values)), len(others) - 1)
     for direction in simplest(right[rank:]):
-        shown = direction / arm.joint_factors
+        shown = np.zeros(len(joints))
+        shown[others] = direction / arm.joint_factors[others]
         yield shown / np.linalg.norm(shown)

@@ -20,12 +20,18 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError, Problem
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solutions import Solutions
-from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.solve import TOLERANCE, solve
 from trajcli.kinematics.inverse.target import IkTarget
 from trajcli.kinematics.robot import Joint, Limits, Robot
 
 
-def solve_pinned(robot: Robot, target: IkTarget, pins: Mapping[int, float], near: Array) -> Solutions:
+def solve_pinned(
+    robot: Robot,
+    target: IkTarget,
+    pins: Mapping[int, float],
+    near: Array | None,
+    tolerance: float = TOLERANCE,
+) -> Solutions:
     """Return every configuration of a robot that meets a target with some joints at given values.
 
     Args:
@@ -33,16 +39,17 @@ def solve_pinned(robot: Robot, target: IkTarget, pins: Mapping[int, float], near
         target: One target, or several.
         pins: Values by the index of the joint, rad or m.
         near: Joint values (..., n), as for `solve`.
+        tolerance: What an answer may miss the target by, m and rad.
 
     Raises:
         PlanningError: When every joint is pinned.
     """
     if not pins:
-        return solve(robot, target, near)
+        return solve(robot, target, near, tolerance)
     others = [joint for joint in range(len(robot.joints)) if joint not in pins]
     if not others:
         raise PlanningError(Problem("every joint is pinned: nothing is left to be solved", "leave one out"))
-    found = solve(without_pinned(robot, pins), target, near[..., others])
+    found = solve(without_pinned(robot, pins), target, None if near is None else near[..., others], tolerance)
     return replace(
         found,
         joints=_with_pins(found.joints, others, pins),
