@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import shutil
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -109,3 +111,27 @@ def test_the_site_leads_there_once_the_address_is_real(
     (tmp_path / "pyproject.toml").write_text(f"[tool.hatch.metadata.hooks.custom]\naddress = '{address}'\n")
     config = SimpleNamespace(repo_url="")
     assert on_config(config).repo_url == led_to
+
+
+def test_the_commands_of_a_fresh_clone_do_what_the_readme_says(tmp_path: Path) -> None:
+    """`make demo` where the environment is set up: what is printed, and the file that it leaves."""
+    shown = re.search(r"```console\n\$ make demo +# sets up .venv, plans (\S+) into (\S+), shows", README)
+    assert shown is not None
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    stamp = str(tmp_path / ".venv/.installed")
+    words = ["make", "demo", f"BIN={Path(sys.executable).parent}", f"STAMP={stamp}", "-o", stamp]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
+    rows = (tmp_path / shown[2]).read_text(encoding="utf-8").splitlines()
+    assert rows == (ROOT / "tests/golden/ur5e_pick.csv").read_text(encoding="utf-8").splitlines()
+    assert done.stdout.splitlines()[-4:] == rows[:4]
+    assert "ur5e_pick: verified, 9 moves, 6.8513 s, 858 rows" in done.stderr
+    asked = subprocess.run(
+        ["make", "-n", "test", "-o", ".venv/.installed"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert "-m pytest" in asked.stdout
+
+
+def test_the_readme_fits_three_screens() -> None:
+    assert len(README.splitlines()) <= 3 * 50
+    assert all(f"trajcli {command}" in README for command in ("plan", "check", "view", "fk"))
