@@ -9,7 +9,14 @@ from trajcli.cli.numbers import numbers
 from trajcli.cli.polynomials import law_lines
 
 if TYPE_CHECKING:
-    from trajcli.job.explanation import ChoiceReport, CornerReport, ExplainedMove, PoseReport, SegmentReport
+    from trajcli.job.explanation import (
+        ChoiceReport,
+        CornerReport,
+        ExplainedMove,
+        PoseReport,
+        SegmentReport,
+        WeaveReport,
+    )
     from trajcli.job.report import ToolReport
 
 _ZERO = 1e-9  # user units: a coordinate or an angle below that is rounding
@@ -30,6 +37,8 @@ def tool_lines(move: ExplainedMove) -> Iterator[str]:
     yield f"  path: {path.length:.9g} {path.unit}"
     yield from (f"    {_segment(segment)}" for segment in path.segments)
     yield from (f"    corner {n}: {_corner(corner)}" for n, corner in enumerate(path.corners, 1))
+    if path.weave is not None:
+        yield f"    weave: {_weave(path.weave)}"
     yield from law_lines(path.law)
     yield from _speeds(tool, move.start)
 
@@ -51,6 +60,13 @@ def _segment(segment: SegmentReport) -> str:
     size = f"radius {segment.radius:.9g}, angle {segment.angle:.9g} {segment.angle_unit}"
     pitch = f", pitch {segment.pitch:.9g}" if segment.kind == "helix" else ""
     return f"{segment.kind} from {ends}: {around}, {size}{pitch}"
+
+
+def _weave(weave: WeaveReport) -> str:
+    parts = zip(weave.cycles, weave.lengths, strict=True)
+    cycles = ", then ".join(f"{count:g} of {length:.6g}" for count, length in parts)
+    how = f"{weave.amplitude:.6g} {weave.unit} to each side"
+    return f"{weave.shape}, {how}, cycles along the path: {cycles} {weave.unit}"
 
 
 def _corner(corner: CornerReport) -> str:

@@ -183,13 +183,26 @@ class CornerReport(ReportPart):
     turn_unit: UnitName = "rad"
 
 
-class PathReport(ReportPart):
+class WeaveReport(ReportPart):
+    """A swing to both sides of the path, which is then its seam: length, segments and s are of that."""
+
+    shape: Literal["sine", "triangle", "trapezoid"]
+    amplitude: Annotated[float, MeasuredIn(), Field(description="To each side.")]
+    lengths: Annotated[
+        Vector, MeasuredIn(), Field(description="Of a cycle, for each part of the seam between stops.")
+    ]
+    cycles: Annotated[list[float], Field(description="For each of these parts, whole or half ones.")]
+    unit: UnitName = "m"
+
+
+class PathReport(_Sparse):
     """The path of the tool as a drawing office would state it, and the law along it."""
 
     length: Annotated[float, MeasuredIn()]
     unit: UnitName
     segments: list[SegmentReport]
     corners: list[CornerReport]
+    weave: WeaveReport | None = None
     law: list[PolynomialReport]
 
 

@@ -26,6 +26,7 @@ from trajcli.job.explanation import (
     ScrewSegmentReport,
     SegmentReport,
     UnitsReport,
+    WeaveReport,
 )
 from trajcli.job.report import MoveReport, WaypointReport
 from trajcli.job.reports.part import in_units
@@ -212,7 +213,10 @@ def _path(tool: ToolMotion, units: Units, *, derivatives: bool) -> PathReport:
     segments, corners = _drawing(tool)
     length = float(tool.law.piece_ends()[1][-1, 0])
     unit = "rad" if tool.pure_rotation else "m"
-    path = in_units(PathReport(length=length, unit=unit, segments=segments, corners=corners, law=[]), units)
+    report = PathReport(
+        length=length, unit=unit, segments=segments, corners=corners, weave=_weave(tool), law=[]
+    )
+    path = in_units(report, units)
     scale = factor(Quantity("angle" if tool.pure_rotation else "length"), units)
     coefficients = tool.law.coefficients[:, :, 0] / scale
     law = polynomial_intervals(tool.law.breaks, coefficients, path.unit, derivatives=derivatives)
@@ -236,6 +240,20 @@ def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]
     return [_segment(segment) for segment in curve.segments], [
         _corner(corner, "overlap" if tool.overlaps else corner.kind) for corner in curve.corners
     ]
+
+
+def _weave(tool: ToolMotion) -> WeaveReport | None:
+    """Return how the tool weaves about its path; None where it does not."""
+    if tool.path is None or not tool.path.weaves:
+        return None
+    weave: Any = getattr(tool.path.poses, "position", None)
+    edges = np.diff([0.0, *weave.stops.tolist(), weave.length])
+    return WeaveReport(
+        shape=weave.shape,
+        amplitude=weave.amplitude,
+        lengths=_plain(edges / np.array(weave.cycles)),
+        cycles=list(weave.cycles),
+    )
 
 
 def _corner(corner: Corner, kind: str) -> CornerReport:

@@ -7,10 +7,12 @@ import pytest
 from independent_motion import poses, series_of
 from tool_jobs import DOWN, plan, refusal
 
+from trajcli.cli.tool_text import tool_lines
 from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import FixedOrientation
 from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.weave import Weave
+from trajcli.output.explain import explanation
 
 HERE = {"xyz": [0.4, -0.1, 0.3], "rpy": DOWN}
 TO = [0.4, 0.1, 0.3]  # 0.2 m along y: with the tool's z down the weave is along x
@@ -59,6 +61,19 @@ def test_a_sine_is_followed_within_tolerance_and_its_mean_is_the_seam():
     assert np.ptp(places[:, 0]) == pytest.approx(2 * A, rel=1e-3)
 
 
+def nominal(corners, slope, phase):
+    """Return the wave at phases, its peaks 1 and -1: slopes that go over in 5 % of a cycle, summed up."""
+    fine = np.linspace(0.0, 1.0, 200_001)
+    behind = {2: (-1.0, 1.0), 4: (0.0, -1.0, 0.0, 1.0)}[len(corners)]
+    rate, before = np.full(fine.size, slope), 1.0
+    for corner, after in zip(corners, behind, strict=True):
+        x = np.clip((fine - corner) / 0.05 + 0.5, 0.0, 1.0)
+        rate += slope * (after - before) * x**2 * (3 - 2 * x)
+        before = after
+    wave = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2)]) / (fine.size - 1)
+    return np.interp(phase, fine, wave / wave.max())
+
+
 @pytest.mark.parametrize(
     ("shape", "corners", "slope"),
     [("triangle", (0.25, 0.75), 4.0), ("trapezoid", (0.125, 0.375, 0.625, 0.875), 8.0)],
@@ -80,6 +95,10 @@ def test_flanks_are_straight_and_corners_rounded_within_five_percent(shape, corn
     flank = np.where(np.abs(sharp) < 0.8, steeper * sharp, sharp)
     rows = far & (np.abs(sharp) < 0.8)
     assert np.abs(swing - flank)[rows].max() < 2 * TOLERANCE / A
+    assert np.abs(swing - nominal(corners, slope, phase)).max() < 2 * TOLERANCE / A
+    assert np.abs(places[:, 1] - (s - 0.1)).max() < TOLERANCE
+    even = np.interp(np.linspace(0, 0.2, 20001)[:-1], s, places[:, 0])
+    assert even.mean() == pytest.approx(0.4, abs=2 * TOLERANCE)  # its mean is the seam
     assert slope * steeper == pytest.approx(np.abs(np.gradient(swing[rows], s[rows] / CYCLE)).max(), rel=0.05)
 
 
@@ -210,3 +229,23 @@ def test_a_weave_is_not_flown_by():
     assert "it weaves" in problem.message
     made = plan("ur5e", HERE, first, last, limits=WIDE, zone=0.01)
     assert not made.flyby.zones
+
+
+@pytest.mark.parametrize("shape", ["sine", "triangle", "trapezoid"])
+def test_an_explanation_says_shape_amplitude_and_cycles(shape):
+    """In the units of the job; without a weave it says nothing of one."""
+    corner = {"line": {"xyz": [0.4, -0.07, 0.3]}, "radius": 0.0}
+    move = {"planner": "path", "segments": [corner, {"line": {"xyz": [0.4, -0.05, 0.31]}}]}
+    given = {"shape": shape, "amplitude": A, "length": CYCLE}
+    made = plan("ur5e", HERE, {**move, "law": LAW, "weave": given}, limits=WIDE)
+    path = explanation(made).moves[0].path
+    assert (path.weave.shape, path.weave.amplitude, path.weave.cycles) == (shape, A, [3.0, 2.0])
+    lengths = [0.01, np.hypot(0.02, 0.01) / 2]
+    assert path.weave.lengths == pytest.approx(lengths)
+    (line,) = (text for text in tool_lines(explanation(made).moves[0]) if "weave" in text)
+    cycles = f"3 of {lengths[0]:.6g}, then 2 of {lengths[1]:.6g}"
+    assert line.strip() == f"weave: {shape}, 0.002 m to each side, cycles along the path: {cycles} m"
+    assert (
+        "weave"
+        not in explanation(plan("ur5e", HERE, {**move, "law": LAW}, limits=WIDE)).moves[0].path.model_dump()
+    )
