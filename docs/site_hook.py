@@ -88,8 +88,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str: 
     name = page.file.src_uri
     weight = next((value for start, value in _BOOSTS.items() if name.startswith(start)), _BOOST)
     page.meta.setdefault("search", {"boost": weight})
-    if name == "gallery.md":
-        page.meta["hide"] = ["toc"]
+    if name == "gallery.md" or name.startswith("examples/"):
+        page.meta["hide"] = ["navigation", "toc"]
     if name == "index.md":
         page.meta["hide"] = ["navigation", "toc"]
         markdown = landing(markdown)
