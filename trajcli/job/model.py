@@ -444,6 +444,11 @@ class Job(Model):
         return any(move.changes_tool for move in self.moves)
 
     @property
+    def names_zones(self) -> bool:
+        """Whether a zone is named, for all corners or for one."""
+        return self.zone is not None or any(move.zone is not None for move in self.moves)
+
+    @property
     def has_signals(self) -> bool:
         """Whether any move sets a signal."""
         return any(move.at or hasattr(move, "signal") for move in self.moves)

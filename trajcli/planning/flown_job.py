@@ -66,21 +66,18 @@ class FlyBy:
 
 
 def flown_plan(
-    loaded: LoadedJob, stopping: Sequence[PlannedMove], adapted: Adaptation | None
+    loaded: LoadedJob, stopping: Sequence[PlannedMove], corners: FlownCorners, adapted: Adaptation | None
 ) -> tuple[list[PlannedMove], FlyBy, list[Event]]:
     """Return the moves of a job, those between zones as one motion, what that gained, and what is said of it.
 
     Args:
         loaded: The job.
         stopping: Its moves as planned with stops.
+        corners: Those that shall be flown by, and what is said of others.
         adapted: By what moves are planned otherwise than their limits alone say.
-
-    Raises:
-        InputError: Where a move names a zone that cannot be.
     """
-    corners, remarks = flown_corners(loaded)
-    moves, flyby, events = _fly(loaded, stopping, corners, adapted)
-    return moves, flyby, [*remarks, *events]
+    moves, flyby, events = _fly(loaded, stopping, corners.flown, adapted)
+    return moves, flyby, [*corners.remarks, *events]
 
 
 def _fly(
@@ -184,7 +181,20 @@ class FlownCorner:
     explicit: bool
 
 
-def flown_corners(loaded: LoadedJob) -> tuple[list[FlownCorner], list[Event]]:
+@frozen
+class FlownCorners:
+    """The corners of a job that shall be flown by.
+
+    Attributes:
+        flown: In order.
+        remarks: On those where the zone of the job cannot be.
+    """
+
+    flown: tuple[FlownCorner, ...]
+    remarks: tuple[Event, ...]
+
+
+def flown_corners(loaded: LoadedJob) -> FlownCorners:
     """Return the corners of a job that shall be flown by, and remarks on those where its own zone cannot be.
 
     Raises:
@@ -208,7 +218,7 @@ def flown_corners(loaded: LoadedJob) -> tuple[list[FlownCorner], list[Event]]:
     problems = [_problem(loaded, *each) for each in refused if _place(loaded, each[0]) not in flown_by]
     if problems:
         raise InputError(*problems)
-    return corners, [*remarks, *(_remark(*each) for each in refused)]
+    return FlownCorners(tuple(corners), (*remarks, *(_remark(*each) for each in refused)))
 
 
 def _remark(index: int, reason: str) -> Event:
@@ -262,4 +272,4 @@ def chains(corners: Sequence[FlownCorner]) -> Iterator[list[FlownCorner]]:
         yield chain
 
 
-__all__ = ["FlownZone", "FlyBy", "flown_plan"]
+__all__ = ["FlownZone", "FlyBy", "flown_corners", "flown_plan"]

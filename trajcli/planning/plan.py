@@ -121,15 +121,15 @@ def plan_job(
         PlanningError: When a move has no curve.
     """
     poses: dict[int | None, ResolvedPose] = {}
-    moves, flyby, of_corners = (
-        _plan_moves(loaded, poses, carried, adapted, known or KnownMoves()),
-        None,
-        list[Event](),
-    )
-    if loaded.job.zone is not None or any(move.zone is not None for move in loaded.job.moves):
-        from trajcli.planning.flown_job import flown_plan
+    corners = None
+    if loaded.job.names_zones:
+        from trajcli.planning.flown_job import flown_corners, flown_plan
 
-        moves, flyby, of_corners = flown_plan(loaded, moves, adapted)
+        corners = flown_corners(loaded)  # one that cannot be is refused before anything is planned
+    moves = _plan_moves(loaded, poses, carried, adapted, known or KnownMoves())
+    flyby, of_corners = None, list[Event]()
+    if corners is not None:
+        moves, flyby, of_corners = flown_plan(loaded, moves, corners, adapted)
     events = [*loaded.events, *_events_of(poses.get(None), None)]
     for move in moves:
         events += _events_of(poses.get(move.index), move.index)

@@ -19,6 +19,7 @@ _MANY = 64  # breaks of a section between two stops: with more, a node at each i
 _WIDEST = 0.3  # of the duration of a section: a wider window would leave nothing of the law
 _SEARCHED = 8  # samples between two nodes, among which the times of breaks are looked up
 _NEWTON = 3  # steps after that
+_SLOWEST = 0.3  # of the speed at an end: an acceleration there is not followed to less
 _REST = (0.0, 0.0)
 
 
@@ -166,32 +167,36 @@ def _nodes(
             near = abs(
                 float(average.states(np.array([passed[end] + (1 + 2 * end) * average.width]))[0][0] - s[end])
             )
-            speed, acceleration = _led_to(
-                state[0], np.abs(s - s[end]) / near, 1 + 2 * end, near, speed, acceleration
-            )
+            speed, acceleration = _led_to(state, s - s[end], 1 + 2 * end, near, speed, acceleration)
         speed[end], acceleration[end] = state
     return s, speed, acceleration
 
 
 def _led_to(
-    wanted: float, shares: Array, sign: int, length: float, speed: Array, acceleration: Array
+    state: tuple[float, float], offsets: Array, sign: int, length: float, speed: Array, acceleration: Array
 ) -> tuple[Array, Array]:
-    """Return speeds and accelerations that come near to a speed as the shares (k,) of a length vanish.
+    """Return speeds and accelerations that come near to a state as the offsets (k,) from it vanish.
+
+    They come near to those of a constant acceleration that leads through the state: where it is slow, and
+    slows down or has just begun to move, its speed is another one soon.
 
     Args:
-        wanted: The speed where the share is zero.
-        shares: Distances from there, in multiples of the length.
-        sign: 1 where s grows with the distance, or -1.
+        state: Speed and acceleration where the way is zero.
+        offsets: From there, along s.
+        sign: 1 where the state is the first one, or -1.
         length: Over which the speed is led away from it.
         speed: Shape (k,).
         acceleration: Shape (k,).
     """
-    x = np.minimum(shares, 1.0)
+    x = np.minimum(np.abs(offsets) / length, 1.0)
     weight, slope = x**2 * (3.0 - 2.0 * x), sign * 6.0 * x * (1.0 - x) / length
+    squares = 1.0 + 2.0 * state[1] * offsets / state[0] ** 2
+    wanted = state[0] * np.sqrt(np.maximum(squares, _SLOWEST**2))
+    rising = np.where(squares > _SLOWEST**2, state[1] / wanted, 0.0)
     led = wanted + (speed - wanted) * weight
     with np.errstate(divide="ignore", invalid="ignore"):
         along = np.where(speed > 0.0, acceleration / speed, 0.0)
-    changed = led * (slope * (speed - wanted) + weight * along)
+    changed = led * (slope * (speed - wanted) + weight * along + (1.0 - weight) * rising)
     return led, np.where(x < 1.0, changed, acceleration)
 
 

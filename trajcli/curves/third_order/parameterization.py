@@ -39,6 +39,7 @@ _NEARLY = 1.5  # excess that is worth finer nodes
 _GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
 _REFINEMENTS = 7
 _SETTLING, _MOST_SETTLING = 8, 30  # steps with lowered limits; where nothing can be slowed down
+_FEWER, _PATIENCE = 512, 1  # nodes, and steps without a gain, where nobody waits for what is hopeless
 _LOST = 1e-3  # of the duration, by estimate: finer nodes would not gain more
 _FEW_NEW = 0.02  # of the intervals: fewer new ones are not worth another step
 _LOWERED, _LOWERED_MORE = 1.1, 1.5  # times the excess that limits are lowered by
@@ -75,6 +76,7 @@ def jerk_limited_time_optimal(
     further_jerk: Sequence[ThirdOrderConstraint] = (),
     along: tuple[float, float] = (np.inf, np.inf),
     hopeless: float = np.inf,
+    slower: float = 0.0,
 ) -> JerkLimitedMotion:
     """Return the fastest motion that is found along a path within bounds that hold for all t.
 
@@ -92,6 +94,8 @@ def jerk_limited_time_optimal(
         along: As for `time_optimal`.
         hopeless: With velocities at the ends, how many times a limit may be passed after the first steps:
             with more nobody waits for it to be kept.
+        slower: By what part the velocities at the ends may be lower than given, where the whole is slowed
+            down by that little to keep the limits.
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -108,11 +112,13 @@ def jerk_limited_time_optimal(
         (JointConstraint(path, bounds[0], bounds[1]), *further),
         (JointJerkConstraint(path, bounds[2]), *further_jerk),
     )
-    search = _Search(limits, smoothed_law(path, second, (bounds[1], bounds[2]), ends), ends.rests)
-    lost = search.refine(most_nodes(path), np.inf if ends.rests else hopeless)
-    search.settle(most_nodes(path), _SETTLING if ends.rests or np.isfinite(hopeless) else _MOST_SETTLING)
+    search = _Search(limits, smoothed_law(path, second, (bounds[1], bounds[2]), ends), ends.rests, slower)
+    hasty = np.isfinite(hopeless) and not ends.rests
+    most = min(most_nodes(path), _FEWER) if hasty else most_nodes(path)
+    lost = search.refine(most, np.inf if ends.rests else hopeless)
+    search.settle(most, _SETTLING if ends.rests or hasty else _MOST_SETTLING, _PATIENCE if hasty else np.inf)
     law, stretch = search.best, search.stretch
-    if stretch > 1.0 + _EXACT and not ends.rests:
+    if stretch > 1.0 + search.slower and not ends.rests:
         raise search.unsettled()
     curve, trajectory = law_and_trajectory(path, law.pieces)
     if stretch > 1.0 + _EXACT:
@@ -142,6 +148,7 @@ class _Search:
     Attributes:
         limits: To be kept.
         rests: Whether it may be slowed down as a whole.
+        slower: By what part it may be where it does not rest.
         law: The present one.
         excess: What it uses of the limits, shape (3, N).
         lowered: By what its limits are divided in each interval, shape (3, N).
@@ -151,8 +158,9 @@ class _Search:
         refinements: How often nodes were refined.
     """
 
-    def __init__(self, limits: LawLimits, law: QuarticLaw, rests: bool) -> None:
+    def __init__(self, limits: LawLimits, law: QuarticLaw, rests: bool, slower: float) -> None:
         self.limits, self.rests, self.steps, self.refinements = limits, rests, 0, 0
+        self.slower = max(slower, _EXACT)
         self.lowered = np.ones((3, law.lengths.size))
         self.best, self.stretch = law, np.inf
         self._take(law)
@@ -197,11 +205,18 @@ class _Search:
                 break
             last = change
 
-    def settle(self, most: int, steps: int) -> None:
-        """Lower limits in the intervals that exceed them until little is left, in so many steps at most."""
-        lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, _EXACT)
+    def settle(self, most: int, steps: int, patience: float) -> None:
+        """Lower limits in the intervals that exceed them until little is left.
+
+        Args:
+            most: Number of nodes.
+            steps: As many at most.
+            patience: As many of them at most, one after another, that lead to nothing better.
+        """
+        lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, min(self.slower, _SETTLED))
+        best, idle = self.stretch, 0
         for _ in range(steps):
-            if _stretch(self.excess) <= 1.0 + enough:
+            if _stretch(self.excess) <= 1.0 + enough or idle > patience:
                 break
             stubborn = ((self.excess > _STUBBORN) & (self.lowered > _STUBBORN)).any(axis=0)
             if stubborn.any() and self.law.lengths.size + stubborn.sum() <= most:
@@ -209,6 +224,8 @@ class _Search:
                 self._cut(np.where(stubborn, 2, 1))
             self.lowered = self.lowered * (1.0 + lowered * np.maximum(self.excess - 1.0, 0.0))
             self._step(_LAST_GAP)
+            idle = 0 if self.stretch < best else idle + 1
+            best = self.stretch
 
     def _cut(self, parts: NDArray[np.intp]) -> None:
         """Cut each interval into so many (N,) parts."""
@@ -235,8 +252,8 @@ class _Search:
         if self.rests:
             better = law.duration * stretch < self.best.duration * self.stretch
         else:
-            kept, best_kept = stretch <= 1.0 + _EXACT, self.stretch <= 1.0 + _EXACT
-            better = law.duration < self.best.duration if kept and best_kept else stretch < self.stretch
+            kept = max(stretch, self.stretch) <= 1.0 + self.slower
+            better = law.duration < self.best.duration if kept else stretch < self.stretch
         if better:
             self.best, self.stretch = law, stretch
 

@@ -131,7 +131,7 @@ def fastest_durations(steps: Array, pairs: Array, limits: Array) -> Array:
         limits: Lower and upper bounds of velocity, acceleration and jerk, shape (N, 6); of the jerk the upper
             one holds both ways.
     """
-    possible = np.flatnonzero(_reachable(pairs[:, 2:], limits))
+    possible = np.flatnonzero(reachable(pairs[:, 2:], limits))
     found, own = np.full(steps.size, np.inf), np.empty(possible.size)
     if possible.size:
         _fill(own, steps[possible], pairs[possible], limits[possible], slice(0, possible.size))
@@ -139,7 +139,7 @@ def fastest_durations(steps: Array, pairs: Array, limits: Array) -> Array:
     return found
 
 
-def _reachable(states: Array, limits: Array) -> NDArray[np.bool_]:
+def reachable(states: Array, limits: Array) -> NDArray[np.bool_]:
     """Return whether states (N, 2) can be reached from within limits: else ruckig refuses a whole call.
 
     An acceleration a that was built up from zero changed the velocity by a |a| / (2 jerk).

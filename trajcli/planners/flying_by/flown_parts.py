@@ -28,6 +28,7 @@ from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
 _HOPELESS = 1.3  # times a limit after the first steps of a law between states
+_SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
 _BACKWARD = 1e-9  # of the length: a law that goes back by less stands still
 
 
@@ -164,7 +165,7 @@ def along_path(course: Course, stretch: tuple[float, float], states: Array, temp
     if np.isfinite(limits.jerk[moving]).any():
         ends = {"start": (v0, a0), "end": (v1, a1)}
         solved: TimeOptimalMotion = jerk_limited_time_optimal(
-            path, *bounds, limits.jerk, **ends, further=further, hopeless=_HOPELESS
+            path, *bounds, limits.jerk, **ends, further=further, hopeless=_HOPELESS, slower=_SLOWER
         )
     else:
         solved = time_optimal(path, *bounds, start_velocity=v0, end_velocity=v1, further=further)

@@ -20,7 +20,11 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.planners.fastest_through_points.state_times import common_duration, fastest_durations
+from trajcli.planners.fastest_through_points.state_times import (
+    common_duration,
+    fastest_durations,
+    reachable,
+)
 
 _INSIDE = 0.999999  # of the bounds: states on the edge have no motion at all for ruckig
 _SPEEDS, _ACCELERATIONS = 9, 5  # of the first grid
@@ -184,7 +188,9 @@ class ZonePart:
             for states, path in ((before, self.before), (after, self.after))
         ]
         steps, limits = np.tile(self.steps[joints], count), np.tile(self.bounds[joints], (count, 1))
-        alone = fastest_durations(steps, np.concatenate(rates, axis=2).reshape(-1, 4), limits)
+        pairs = np.concatenate(rates, axis=2).reshape(-1, 4)
+        alone = fastest_durations(steps, pairs, limits)
+        alone[~reachable(pairs[:, :2] * [1.0, -1.0], limits)] = np.inf  # ruckig would pass a limit and brake
         return np.asarray(alone.reshape(count, len(joints)))
 
     def carried(self, states: Array, *, back: bool = False) -> Array:

@@ -95,8 +95,6 @@ class PathMove(WovenMove):
         """Why no motion can fly by a corner of this move; None where it can."""
         if self.corner == "overlap":
             return "its segments overlap in time"
-        if self.corner == "stop" and self._count > 1:
-            return "it stops at corners of its own (`corner: stop`)"
         return super().why_not_flown_by
 
     @model_validator(mode="after")

@@ -185,8 +185,6 @@ class TimeOptimal(ThroughPoints):
         reasons = {
             "its `duration` is given": self.duration is not None,
             "it ends in motion": last is not None and any(last.velocity or ()),
-            "it stops at corners of its own (give `corner`)": self.path == "polyline"
-            and not any(self.corner or ()),
             f"the curvature of its path jumps (rule {self.rule})": self.rule in BENT_RULES,
         }
         return next((reason for reason, holds in reasons.items() if holds), None)

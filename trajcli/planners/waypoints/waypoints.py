@@ -108,6 +108,14 @@ class FastestThroughPoints(PointSequence):
 
     _known: Array | None = PrivateAttr(default=None)
 
+    @property
+    def why_not_flown_by(self) -> str:
+        """Why no motion can fly by a corner of this move."""
+        return (
+            "its way between its points follows from its speeds at them, from rest to rest; a `time_optimal` "
+            "move through the same points can be flown by"
+        )
+
     @model_validator(mode="after")
     def _points_fit(self) -> FastestThroughPoints:
         flaws = [*self._flaws_of_times(), *self._flaws_of_points()]
