@@ -22,6 +22,7 @@ from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot
 from trajcli.geometry.pose import build
 from trajcli.geometry.power_series import growth
 from trajcli.geometry.rotation import exp
+from trajcli.kinematics.following.weave import Weave
 
 ORDER, DURATION = 9, 0.4
 S = [0.9, -0.4, 0.3, 0.5]  # 0.5 + 0.3 t - 0.4 t^2 + 0.9 t^3, which stays within 0.5 to 0.65
@@ -81,6 +82,55 @@ def test_lines_go_as_far_as_s() -> None:
     for curve in (line, PartOfCurve(Line(np.zeros(3), np.array([0, 3.0, 0])), 1.0, 2.0)):
         near(bounds(curve.majorants)[0], lambda s: [s])
         assert not bounds(curve.majorants)[1].any()
+
+
+def waves(shape: str, length: float = 3.0, cycles: float = 4.0) -> Weave:
+    seam = Line(np.zeros(3), np.array([length, 0.0, 0.0]))
+    return Weave(seam, FixedOrientation(np.diag([1.0, -1.0, -1.0]), length), 0.02, (cycles,), shape)
+
+
+def test_a_sine_about_a_line_is_the_line_and_an_exponential_of_its_phase() -> None:
+    rate = 2 * np.pi / 3
+
+    def weave(s: np.ndarray) -> list[np.ndarray]:
+        return [s, 0.02 * cis(rate * s).imag]
+
+    near(bounds(waves("sine", cycles=1.0).majorants)[0], weave, within=1000.0)
+    assert not bounds(waves("sine").majorants)[1].any()
+
+
+@pytest.mark.parametrize(("shape", "slope"), [("triangle", 4 / (1 - 1.5 * 0.025)), ("trapezoid", 8.0)])
+def test_flanks_of_a_wave_are_lines_and_its_corners_quartics(shape: str, slope: float) -> None:
+    """Two pieces of time: one on a flank, and one in the first half of a corner, where slopes go over."""
+    seam = waves(shape, 3.0, 0.3)  # s from 0.5 to 0.65 is within 0.05 to 0.065 of a cycle
+    near(bounds(seam.majorants)[0], lambda s: [s, 0.02 * slope * 0.1 * s])
+    corner, behind = (0.25, -2.0) if shape == "triangle" else (0.125, -1.0)
+    begins = corner - 0.025  # there x of the smooth step 3 x^2 - 2 x^3 is 0; it is 1 behind 0.05 of a cycle
+    rate = (begins + 0.001) / 0.5
+    woven, law = waves(shape, 3.0, 3.0 * rate), [-0.02, 0.05, 0.5]
+    assert np.polyval(law, DURATION) * rate < corner  # where its own quartic ends
+    rising = growth(np.array(law)[:, None, None], np.array([DURATION]), ORDER)[:, :, 0]
+    found = woven.majorants(np.array([np.polyval(law, DURATION / 2)]), rising)[0][1:, 0]
+    for t in np.linspace(0, DURATION, 101):
+        s = np.zeros(ORDER + 1)
+        s[:3] = [np.polyval(np.polyder(law, k), t) / factorial(k) for k in range(3)]
+        x = rate * s / 0.05
+        x[0] -= begins / 0.05
+        square = product(x, x)
+        bend = behind * (product(square, x) - product(square, square) / 2) * 0.05
+        true = np.linalg.norm([s, 0.02 * slope * (rate * s + bend)], axis=0)[1:]
+        assert (found >= true * (1 - 1e-9)).all()
+        assert true[3] > 0
+
+
+def test_other_weaves_have_no_bound() -> None:
+    turning = AxisAngleOrientation.between(np.eye(3), exp(0.3 * np.array([1.0, 0.0, 0.0])), 3.0)
+    seam = Line(np.zeros(3), np.array([3.0, 0.0, 0.0]))
+    arc = Weave(ARC, FixedOrientation(np.eye(3), ARC.length), 0.02, (4.0,))
+    for weave in (Weave(seam, turning, 0.02, (4.0,)), arc):
+        assert np.isinf(bounds(weave.majorants)[0]).all()
+    fixed = Weave(seam, turning, 0.02, (4.0,), "sine", np.array([0.0, 1.0, 0.0]))
+    assert np.isfinite(bounds(fixed.majorants)[0]).all()
 
 
 def test_a_pivot_moves_by_what_its_ends_are_apart() -> None:

@@ -12,6 +12,8 @@ from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import FixedOrientation
 from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.weave import Weave
+from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.path_bound import path_bounds
 from trajcli.output.explain import explanation
 
 HERE = {"xyz": [0.4, -0.1, 0.3], "rpy": DOWN}
@@ -100,6 +102,25 @@ def test_flanks_are_straight_and_corners_rounded_within_five_percent(shape, corn
     even = np.interp(np.linspace(0, 0.2, 20001)[:-1], s, places[:, 0])
     assert even.mean() == pytest.approx(0.4, abs=2 * TOLERANCE)  # its mean is the seam
     assert slope * steeper == pytest.approx(np.abs(np.gradient(swing[rows], s[rows] / CYCLE)).max(), rel=0.05)
+
+
+@pytest.mark.parametrize("shape", ["sine", "triangle", "trapezoid"])
+def test_about_a_line_the_distance_from_the_weave_is_proven(shape):
+    """The bound is above what rows show, and within the tolerance; about a corner only rows say it."""
+    made = weaving(weave={"shape": shape})
+    assert [what for what, _ in made.verdict.sampled] == ["branch"]
+    span, (move,) = made.trajectory.spans[0], made.moves
+    limited = LimitedMove(made.trajectory, span, move.robot.limits, move.robot, move.planned.tool)
+    bound, _ = path_bounds(limited)
+    times = np.linspace(0.0, made.trajectory.duration, 4001)
+    s = np.clip(move.planned.tool.law.evaluate(times)[:, 0], 0.0, 0.2)
+    seen = np.linalg.norm(tool_at(made, times) - move.planned.tool.path.poses.position.evaluate(s)[0], axis=1)
+    assert 0.99 * seen.max() < bound.upper_bound < TOLERANCE
+    corner = {"line": {"xyz": [0.4, 0.0, 0.3]}, "radius": 0.02}
+    path = {"planner": "path", "segments": [corner, {"line": {"xyz": [0.48, 0.0, 0.3]}}], "law": LAW}
+    given = {"shape": shape, "amplitude": A, "length": CYCLE}
+    around = plan("ur5e", HERE, {**path, "weave": given}, limits=WIDE)
+    assert "distance from the path" in " and ".join(what for what, _ in around.verdict.sampled)
 
 
 def test_a_half_cycle_more_ends_on_the_seam_too():

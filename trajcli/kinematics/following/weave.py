@@ -27,6 +27,7 @@ from trajcli.geometry.paths.chain import Chain
 from trajcli.geometry.paths.corner import Blend
 from trajcli.geometry.paths.orientation import OrientationCurve
 from trajcli.geometry.paths.position import (
+    Line,
     PartOfCurve,
     PositionCurve,
     Side,
@@ -35,12 +36,14 @@ from trajcli.geometry.paths.position import (
     nearest,
     shown_length,
 )
+from trajcli.geometry.power_series import growth, series_exponential, series_product
 from trajcli.geometry.rotation import Array
 
 WaveShape = Literal["sine", "triangle", "trapezoid"]
 
 _ROUNDED = 0.05  # of a cycle: a corner of a wave, from where it begins to bend to where it is straight again
 _CLOSE = 1e-9  # of the seam: breaks that are nearer are one
+_STILL = 1e-12  # of bounds of rates of an orientation: rounding of one that stays
 _SQUARE = 0.1  # of a unit vector: what must be left of the side across the seam
 _CORNERS: dict[str, tuple[tuple[float, float], ...]] = {
     "triangle": ((0.25, -1.0), (0.75, 1.0)),
@@ -126,8 +129,16 @@ class Weave:
         return self.seam.transport(s, side)
 
     def majorants(self, s: Array, rising: Array) -> tuple[Array, Array]:
-        """Return the bounds of p and Q as `PositionCurve` says: none of p are known."""
-        return np.full(rising.shape, np.inf), self.seam.majorants(s, rising)[1]
+        """Return the bounds of p and Q as `PositionCurve` says: of p about a line whose side stays."""
+        along, turned = self.seam.majorants(s, rising)
+        whole = self.seam
+        while isinstance(whole, PartOfCurve):
+            whole = whole.curve
+        stays = self.across is not None or not (self.orientation.majorant(s, rising)[1:] > _STILL).any()
+        if not (isinstance(whole, Line) and stays):
+            return np.full(rising.shape, np.inf), turned
+        rate = self.cycles[0] / self.length
+        return along + self.amplitude * _wave_majorant(self.shape, s * rate, rate * rising), turned
 
     @property
     def _sections(self) -> list[tuple[float, float, float]]:
@@ -177,6 +188,29 @@ def _of_phase(shape: WaveShape, phase: Array) -> Triple:
     part = phase - np.floor(phase)
     rows = _wave(shape).evaluate_orders(part, (0, 1, 2))[:, :, 0].T
     return rows[0], rows[1], rows[2]
+
+
+def _wave_majorant(shape: WaveShape, phase: Array, rising: Array) -> Array:
+    """Return bounds of |w^(m)| / m! by time (order + 1, P), on pieces with these phases (P,), in cycles.
+
+    The wave is exp(i f), or a polynomial of the phase f, of what the phase rises by.
+
+    Args:
+        shape: Of the wave.
+        phase: Within each piece, none of which passes a break of the wave, shape (P,).
+        rising: Bounds of |f^(m)| / m!, shape (order + 1, P).
+    """
+    rising = np.concatenate([np.zeros((1, rising.shape[1])), rising[1:]])
+    if shape == "sine":
+        return series_exponential(2.0 * np.pi * rising)
+    wave = _wave(shape)
+    piece = np.clip(np.searchsorted(wave.breaks, phase - np.floor(phase), "right") - 1, 0, wave.pieces - 1)
+    sizes = growth(wave.coefficients, wave.lengths, wave.degree)[:, piece, 0]
+    result, power = np.zeros(rising.shape), rising
+    for size in sizes[1:]:
+        result += size * power
+        power = series_product(power, rising)
+    return result
 
 
 @cache
