@@ -127,6 +127,8 @@ def multiples_of_pi(values: ArrayLike) -> list[str | None]:
     rest = np.abs(ratios[left])
     before, last = np.array([[0.0], [1.0]]), np.array([[1.0], [0.0]])  # numerators and denominators
     for _ in range(_CONVERGENTS):
+        if not left.size:
+            break
         whole = np.floor(rest)
         before, last = last, whole * last + before
         size = np.abs(ratios[left])

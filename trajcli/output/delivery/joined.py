@@ -167,7 +167,11 @@ def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
             yield _at_knots(rows, rows.groups, {"rows": "knots"})
         if content == "rows":
             for columns in (_STATES, _WITHOUT_ACCELERATION):
-                yield _at_knots(rows, columns, {"rows": "knots", "columns": columns})
+                if (
+                    "q" not in rows.groups
+                    or replace(rows, groups=columns).interpolation != rows.interpolation
+                ):
+                    yield _at_knots(rows, columns, {"rows": "knots", "columns": columns})
     if full is not None and content == "rows":
         yield OtherRows(replace(rows, groups=full), {"columns": full})
     if content != "log" and "qdd" in rows.groups:

@@ -383,7 +383,8 @@ def _shares(
 def _tool_of(plan: Plan) -> ToolJudge | None:
     """Return the judge of the limits of the tool, and of its paths, where there are any."""
     paths = {move.index: move.planned.tool for move in plan.moves}
-    limited = any(move.robot.limits.tcp != ToolLimits() for move in plan.moves)
+    robots = {id(move.robot): move.robot for move in plan.moves}.values()
+    limited = any(robot.limits.tcp != ToolLimits() for robot in robots)
     if not limited and all(path is None for path in paths.values()):
         return None
     from trajcli.judge.recorded_tool import ToolJudge
