@@ -10,6 +10,8 @@ import pytest
 from running import EXAMPLES, FAST, JOB, ROOT, call
 
 from trajcli.cli.app import app
+from trajcli.job.read import job_from_text
+from trajcli.planning.plan import plan_job
 
 Capture = pytest.CaptureFixture[str]
 COMMANDS = sorted(command.callback.__name__ for command in app.registered_commands if command.callback)
@@ -103,6 +105,10 @@ def test_init_writes_a_job_that_plans(capfd: Capture) -> None:
     assert out.startswith("t,q1_deg,")
     starter = Path("job.yaml").read_text()
     assert call(capfd, "init", "-").out == starter
+    assert {"frames", "tool", "- {repeat"} <= set(re.findall(r"^ *# (frames|tool|- \{repeat)", starter, re.M))
+    uncommented = re.sub(r"^( *)# (frames|tool|- \{repeat)", r"\1\2", starter, flags=re.M)
+    plan = plan_job(job_from_text(uncommented))
+    assert (plan.verdict.passed, len(plan.moves)) == (True, 7)
 
 
 def test_init_does_not_overwrite(capfd: Capture) -> None:
