@@ -7,6 +7,7 @@ kept beside the table, line by line as it comes, so that a sweep that was ended 
 from __future__ import annotations
 
 import json
+import math
 import random
 import re
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -160,7 +161,7 @@ def _bound(plan: Plan) -> float | None:
     if plan.flyby is not None and plan.flyby.zones:
         return plan.flyby.bound
     bounds = [_bound_of_move(move) for move in plan.moves if move.duration > 0]
-    return None if None in bounds else sum(bound for bound in bounds if bound is not None)
+    return None if None in bounds else math.fsum(bound for bound in bounds if bound is not None)
 
 
 def _bound_of_move(move: PlannedMove) -> float | None:

@@ -44,7 +44,7 @@ def _length_of(robot: Robot) -> float:
     """Return the sum of the arm's DH lengths, m; infinite for bare joints."""
     if robot.convention is None:
         return math.inf
-    return sum(abs(joint.a) + abs(joint.d) for joint in robot.joints) or math.inf
+    return math.fsum(abs(joint.a) + abs(joint.d) for joint in robot.joints) or math.inf
 
 
 def _plain_numbers(node: Node | None, key: str, robot: Robot) -> Iterator[tuple[bool, float]]:

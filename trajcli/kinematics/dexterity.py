@@ -7,6 +7,8 @@ turn of the outstretched arm counts as much in position as in orientation.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -91,7 +93,7 @@ def singular_directions(robot: Robot, q: ArrayLike) -> SingularDirections:
 def characteristic_length(robot: Robot) -> float:
     """Return the sum of |a| and |d| of all rows and of the length of the tool, m; 1 where that is zero."""
     lengths = [abs(joint.a) + abs(joint.d) for joint in robot.joints]
-    total = sum(lengths) + float(np.linalg.norm(robot.tool[:3, 3]))
+    total = math.fsum(lengths) + float(np.linalg.norm(robot.tool[:3, 3]))
     return total if total > 0.0 else 1.0
 
 

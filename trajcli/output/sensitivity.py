@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -75,8 +76,8 @@ def _totals(savings: Sequence[Saving], plan: Plan) -> list[SavingReport]:
 def _report(savings: Sequence[Saving], plan: Plan) -> SavingReport:
     """Return the report of one limit in some moves."""
     first, known = savings[0], [one.saved for one in savings if one.saved is not None]
-    duration = sum(plan.moves[one.move].duration for one in savings)
-    saved = None if len(known) < len(savings) else sum(known)
+    duration = math.fsum(plan.moves[one.move].duration for one in savings)
+    saved = None if len(known) < len(savings) else math.fsum(known)
     if saved is not None and abs(saved) <= _NOTHING * duration:
         saved = 0.0
     return SavingReport(

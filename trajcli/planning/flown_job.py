@@ -61,7 +61,7 @@ class FlyBy:
         proven = proven_bounds(self.chains) if self.chains else None
         if not self.chains or proven is None:
             return self.bound, "searched"
-        saved = sum(chain.duration - least for chain, least in zip(self.chains, proven, strict=True))
+        saved = math.fsum(chain.duration - least for chain, least in zip(self.chains, proven, strict=True))
         return self.duration - saved, "proven"
 
 
@@ -96,19 +96,19 @@ def _fly(
         first = number[group[0].move]
         some = moves[first : first + len(group) + 1]
         report_progress(f"flying by the corners of moves {some[0].index} to {some[-1].index}")
-        stopping = sum(move.duration for move in some)
+        stopping = math.fsum(move.duration for move in some)
         chain = _chain(loaded, some, group, adapted, stopping, events)
         if chain is None:
             continue
-        begun = sum(move.duration for move in result[:first])
+        begun = math.fsum(move.duration for move in result[:first])
         of_chain = [zone.shifted(begun, len(zones)) for zone in flown_zones(chain)]
         events += zone_events(of_chain, loaded.robot.joint_names)
         result[first : first + len(some)] = moves_as_flown(some, chain)
         zones += of_chain
         saved += chain.duration - chain.model
         flown_by.append(chain)
-    duration = sum(move.duration for move in result)
-    stopping = sum(move.duration for move in moves)
+    duration = math.fsum(move.duration for move in result)
+    stopping = math.fsum(move.duration for move in moves)
     known = tuple(flown_by) if len(flown_by) == len(groups) else None
     flyby = FlyBy(duration, stopping, duration - max(saved, 0.0), tuple(zones), known)
     return result, flyby, events

@@ -6,6 +6,7 @@ a range. They are taken as unknown, each with a note.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from math import inf
 
@@ -214,7 +215,7 @@ def link_inertia(
             masses.append(mass)
             centers.append(pose[:3, :3] @ center + pose[:3, 3])
             tensors.append(pose[:3, :3] @ tensor @ pose[:3, :3].T)
-    total = sum(masses)
+    total = math.fsum(masses)
     if not total > 0.0:
         return None
     com = sum((m * c for m, c in zip(masses, centers, strict=True)), np.zeros(3)) / total

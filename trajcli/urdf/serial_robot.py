@@ -7,6 +7,7 @@ of the inverse kinematics would fit, and offsets along almost parallel axes woul
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from math import pi
 
@@ -80,12 +81,12 @@ class UrdfRobot:
     @property
     def distance(self) -> float:
         """The most that the tcp moves by all angles that were snapped, m."""
-        return sum(each.distance for each in self.snapped)
+        return math.fsum(each.distance for each in self.snapped)
 
     @property
     def turn(self) -> float:
         """The most that the tool turns by them, rad."""
-        return sum(abs(each.written - each.taken) for each in self.snapped)
+        return math.fsum(abs(each.written - each.taken) for each in self.snapped)
 
     @property
     def remarks(self) -> tuple[str, ...]:

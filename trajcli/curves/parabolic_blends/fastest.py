@@ -15,6 +15,8 @@ Source: Boyd and Vandenberghe, Convex Optimization (2004), chapter 11, for the b
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -178,7 +180,7 @@ def _value(problem: _Problem, weight: float, d: Array, x: Array) -> float:
     slacks = problem.slacks(d, x)
     if min(slack.min() for slack in slacks) <= 0:
         return np.inf
-    return _total(d, x) / weight - float(sum(np.log(slack).sum() for slack in slacks))
+    return _total(d, x) / weight - float(math.fsum(np.log(slack).sum() for slack in slacks))
 
 
 def _newton(problem: _Problem, weight: float, d: Array, x: Array) -> tuple[Array, Array, float]:

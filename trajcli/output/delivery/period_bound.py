@@ -89,7 +89,7 @@ def _tool_keeps(move: PlannedMove, errors: Array, peaks: Array, slack: float) ->
 def _reach(robot: Robot, largest: Array) -> float:
     """Return the longest distance of the tool from any joint, with the slides as far out as they come, m."""
     slides = [float(q) for q, kind in zip(largest, robot.joint_types, strict=True) if kind == "prismatic"]
-    return max(characteristic_length(robot) + sum(slides), 1.0)
+    return max(characteristic_length(robot) + math.fsum(slides), 1.0)
 
 
 def _products(sums: Array) -> Array:

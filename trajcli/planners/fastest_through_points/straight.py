@@ -6,6 +6,7 @@ variable, from 0 to 1, under the limits of whichever joint is tightest; where th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -67,7 +68,7 @@ def straight_motion(problem: WaypointProblem, names: list[str], solve: Solve) ->
     """
     stretches = straight_stretches(problem.points)
     parts = [_along(problem, first, last, names, solve) for first, last in stretches]
-    return joined([motion for motion, _ in parts]), sum(lower for _, lower in parts)
+    return joined([motion for motion, _ in parts]), math.fsum(lower for _, lower in parts)
 
 
 def _along(

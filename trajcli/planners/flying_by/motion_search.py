@@ -226,7 +226,7 @@ def with_paces(chain: FlyByChain, paces: Sequence[float] | Array) -> FlyByChain:
 
 def duration_of(parts: Sequence[FlownPart]) -> float:
     """Return the duration of a motion, s."""
-    return sum(part.curve.duration for part in parts)
+    return math.fsum(part.curve.duration for part in parts)
 
 
 def _found(row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twice: bool) -> FoundStates:

@@ -63,7 +63,7 @@ class ShareBox:
     @property
     def shares(self) -> tuple[tuple[float, float], ...]:
         """Least and largest share of each of the three parts."""
-        middle = max(1.0 - sum(self.high), 0.0), min(1.0 - sum(self.low), 1.0)
+        middle = max(1.0 - math.fsum(self.high), 0.0), min(1.0 - math.fsum(self.low), 1.0)
         return (self.low[0], self.high[0]), middle, (self.low[1], self.high[1])
 
     @property
@@ -82,7 +82,7 @@ class ShareBox:
             halves = replace(self, high=(middle, self.high[1])), replace(self, low=(middle, self.low[1]))
         else:
             halves = replace(self, high=(self.high[0], middle)), replace(self, low=(self.low[0], middle))
-        return [half for half in halves if sum(half.low) < 1.0]
+        return [half for half in halves if math.fsum(half.low) < 1.0]
 
 
 def is_provable(chain: FlyByChain) -> bool:

@@ -11,6 +11,7 @@ tried, then a slower pace.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -56,7 +57,7 @@ class FlownChain:
     @property
     def duration(self) -> float:
         """Seconds."""
-        return sum(part.curve.duration for part in self.parts)
+        return math.fsum(part.curve.duration for part in self.parts)
 
 
 def proven_bounds(chains: Sequence[FlownChain]) -> list[float] | None:

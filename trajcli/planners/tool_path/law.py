@@ -480,7 +480,7 @@ def law_along(
 
 def lasting_at_least(duration: float | None, segments: list[LawSegment]) -> list[LawSegment]:
     """Return the segments, slowed down where they last less than a duration altogether."""
-    total = sum(segment.law.duration for segment in segments)
+    total = math.fsum(segment.law.duration for segment in segments)
     if duration is None or total >= duration:
         return segments
     return [segment.scaled(duration / total) for segment in segments]

@@ -9,6 +9,7 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -158,7 +159,7 @@ def _law_segments(
     curves: Sequence[PositionCurve], vectors: Array, move: ToolPathMove, overlap: float, limits: ToolLimits
 ) -> list[LawSegment]:
     """Return the law of each segment, of which neighbours together keep the limits."""
-    spec, total = move.law, sum(curve.length for curve in curves)
+    spec, total = move.law, math.fsum(curve.length for curve in curves)
     shared = (len(curves) - 1) * overlap
     lower = replace(  # two at once add up
         limits, acceleration=limits.acceleration / _largest_turn(curves), jerk=limits.jerk / 2
