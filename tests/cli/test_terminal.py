@@ -156,8 +156,8 @@ def test_a_batch_counts_and_says_at_its_end_why_jobs_failed(tmp_path: Path) -> N
     ends = [k for k, line in enumerate(lines) if re.match(r"(written|failed) +/", line)]
     assert [lines[k].split()[0] for k in ends] == ["written", "written", "failed"]
     assert all(lines[k].endswith("  1 s") for k in ends[:2])
-    behind = " ".join(lines[ends[-1] + 1 :])
-    assert re.search(r"c\.yaml: +failed: move 0 \(quintic\): the velocity", behind)
+    behind = " ".join(" ".join(lines[ends[-1] + 1 :]).split())  # wherever lines are broken
+    assert "c.yaml: failed: move 0 (quintic): the velocity" in behind
     assert "quintic" not in " ".join(lines[: ends[-1]])
     assert max(len(line) for line in lines if "/" not in line) <= 80  # paths are not broken
     assert "{" not in text
@@ -190,7 +190,7 @@ def test_payload_says_which_trial_runs(capfd: pytest.CaptureFixture[str]) -> Non
 
 @pytest.mark.parametrize("path", few(sorted(EXAMPLES.glob("*.yaml")), 2), ids=lambda path: path.stem)
 def test_no_example_floods_a_terminal(path: Path) -> None:
-    for words, most in ((("plan", path), 30), (("explain", path), 60)):
+    for words, most in ((("plan", path), 32), (("explain", path), 60)):
         _, text = on_terminal(*words)
         lines = lines_of(text.replace("\r\x1b[2K", "\n"))
         assert max(map(len, lines)) <= 80
