@@ -7,7 +7,7 @@ from typing import Any
 
 from docs.markdown import table
 from trajcli.job.robot import CATALOGUE, RobotSheet, catalogue_names, read_sheet
-from trajcli.queries.catalogue_list import INDEX, checksum, rows_of_files
+from trajcli.queries.catalogue_list import IN_INDEX, INDEX, checksum, rows_of_files
 from trajcli.queries.robot_card import robot_row
 
 _INTRODUCTION = """\
@@ -44,7 +44,9 @@ def index_text() -> str:
     files = checksum()
     if INDEX.exists() and json.loads(INDEX.read_bytes())["files"] == files:
         return INDEX.read_text(encoding="utf-8")
-    rows = ",\n".join(json.dumps(row, ensure_ascii=False) for row in rows_of_files())
+    rows = ",\n".join(
+        json.dumps({key: row[key] for key in IN_INDEX}, ensure_ascii=False) for row in rows_of_files()
+    )
     return f'{{"files": {files}, "robots": [\n{rows}\n]}}\n'
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from trajcli.cli.numbers import number, numbers, table_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark, print_text
 from trajcli.errors import InputError
-from trajcli.queries.catalogue_list import Selection, catalogue_rows, selected
+from trajcli.queries.catalogue_list import Selection, catalogue_rows, rows_of_files, selected
 
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import RobotsCommand
@@ -72,7 +72,7 @@ def _check_forms(name: str | None, forms: Mapping[str, bool]) -> None:
 
 def _print_list(selection: Selection, *, as_json: bool) -> int:
     """Print the robots of the catalogue that are selected."""
-    rows = selected(catalogue_rows(), selection)
+    rows = selected(rows_of_files() if as_json else catalogue_rows(), selection)
     if as_json:
         print_json(rows)
     elif rows:

@@ -1,4 +1,4 @@
-"""List of the catalogue: what is said of each robot, kept in an index beside the files, and choice from it.
+"""List of the catalogue: what its table says of each robot, in an index beside the files, and choice from it.
 
 The index says of which files it was made: of others the list is made anew, robot by robot.
 """
@@ -18,6 +18,8 @@ from trajcli.suggest import did_you_mean
 _FOLDER = Path(__file__).parent.parent / "catalogue"
 INDEX = _FOLDER / "index.json"
 """The file of the index, which `make docs` writes."""
+IN_INDEX = ("name", "title", "joints", "kind", "reach", "units", "maker", "origin")
+"""What the index says of a robot: what the table shows, and what robots are chosen by."""
 _ORIGINS = ("real", "textbook")
 
 
@@ -39,7 +41,7 @@ class Selection:
 
 
 def catalogue_rows() -> list[dict[str, Any]]:
-    """Return what a list says of each robot of the catalogue; see `trajcli.queries.robot_card.robot_row`."""
+    """Return what the table says of each robot of the catalogue: `IN_INDEX`, or more."""
     try:
         index = json.loads(INDEX.read_bytes())
         if index["files"] == checksum():
@@ -58,7 +60,7 @@ def checksum() -> int:
 
 
 def rows_of_files() -> list[dict[str, Any]]:
-    """Return the same of each robot, as its file has it."""
+    """Return all that a list says of each robot, of its file: `trajcli.queries.robot_card.robot_row`."""
     from trajcli.job.robot import catalogue_names
     from trajcli.queries.arm import open_sheet
     from trajcli.queries.robot_card import robot_row
