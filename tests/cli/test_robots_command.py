@@ -21,13 +21,19 @@ def told_of_files():
     return catalogue_list.rows_of_files()
 
 
+def of_table(row):
+    """Return what the table shows of all that is said of a robot, and what robots are chosen by."""
+    keys = ("name", "title", "joints", "kind", "reach", "units", "maker", "origin")
+    return {key: row[key] for key in keys}
+
+
 def test_the_index_says_what_the_files_say(told_of_files):
     index = json.loads(catalogue_list.INDEX.read_bytes())
     assert index["files"] == catalogue_list.checksum(), "run `make docs`"
     for told, row in zip(index["robots"], told_of_files, strict=True):
         assert (told["reach"] is None) == (row["reach"] is None)
         assert told["reach"] == pytest.approx(row["reach"] or 0.0, rel=1e-9) or row["reach"] is None
-        assert {**told, "reach": None} == {key: row[key] for key in catalogue_list.IN_INDEX} | {"reach": None}
+        assert {**told, "reach": None} == {**of_table(row), "reach": None}
 
 
 def test_an_index_of_other_files_is_not_read(monkeypatch, tmp_path, told_of_files):
@@ -36,9 +42,9 @@ def test_an_index_of_other_files_is_not_read(monkeypatch, tmp_path, told_of_file
     monkeypatch.setattr(catalogue_list, "rows_of_files", lambda: told_of_files)
     for text in ("{", "[]", '{"files": 1, "robots": []}'):
         other.write_text(text)
-        assert catalogue_list.catalogue_rows() == told_of_files
+        assert catalogue_list.catalogue_rows() == [of_table(row) for row in told_of_files]
     other.unlink()
-    assert catalogue_list.catalogue_rows() == told_of_files
+    assert catalogue_list.catalogue_rows() == [of_table(row) for row in told_of_files]
 
 
 @pytest.fixture

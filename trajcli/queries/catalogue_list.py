@@ -41,14 +41,14 @@ class Selection:
 
 
 def catalogue_rows() -> list[dict[str, Any]]:
-    """Return what the table says of each robot of the catalogue: `IN_INDEX`, or more."""
+    """Return what the table says of each robot of the catalogue: `IN_INDEX`."""
     try:
         index = json.loads(INDEX.read_bytes())
         if index["files"] == checksum():
             return list(index["robots"])
     except (OSError, ValueError, KeyError, TypeError):
         pass  # without an index the list only takes longer
-    return rows_of_files()
+    return [{key: row[key] for key in IN_INDEX} for row in rows_of_files()]
 
 
 def checksum() -> int:
