@@ -21,7 +21,7 @@ _UPRIGHT = 1e-9  # rad from the vertical: rounding
 
 
 class _CircleError(FlawError):
-    """A frame that is given in itself, which is said of each frame on the way."""
+    """A frame that is given in itself, which is said once: of the frame that is read first."""
 
 
 def frame_named(name: Any, context: ReadingContext, chain: tuple[str, ...] = ()) -> Array:  # noqa: ANN401
@@ -47,8 +47,13 @@ def frame_named(name: Any, context: ReadingContext, chain: tuple[str, ...] = ())
         hint = did_you_mean(name, known) or valid_names(known, "frames")
         raise FlawError(f"there is no frame '{name}'", hint=hint)
     if name in chain:
-        circle = " -> ".join([*chain[chain.index(name) :], name])
-        raise _CircleError(f"the frame '{name}' is given in itself ({circle})")
+        circle = chain[chain.index(name) :]
+        context.circular.update(circle)
+        raise _CircleError(f"the frame '{name}' is given in itself ({' -> '.join([*circle, name])})")
+    if name in context.circular:
+        error = FlawError(f"the frame '{name}' is given in itself")
+        error.flaws = []
+        raise error
     if len(chain) == _LONGEST_CHAIN:
         raise FlawError(f"more than {_LONGEST_CHAIN} frames stand one in the next", hint="give one in world")
     if name not in context.placed:

@@ -73,6 +73,7 @@ class ReadingContext:
         frames: The file's frames, as plain mappings.
         tools: The file's tools, as plain mappings.
         placed: Frames that were resolved, by name: T_world_frame, (4, 4), m.
+        circular: Frames of a circle that was found: it is said once.
         base: Where the arm stands, T_world_base, (4, 4), m.
         waits: Whether a target is given relative to what only the plan knows.
         has_far_angle: Whether a pose has a plain angle of more than two turns, which is a slip of the unit.
@@ -88,6 +89,7 @@ class ReadingContext:
     frames: Mapping[str, Any] = field(default_factory=dict)
     tools: Mapping[str, Any] = field(default_factory=dict)
     placed: dict[str, np.ndarray] = field(default_factory=dict)
+    circular: set[str] = field(default_factory=set)
     base: np.ndarray = field(default_factory=lambda: np.eye(4))
     waits: bool = False
     has_far_angle: bool = False

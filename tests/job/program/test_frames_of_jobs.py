@@ -210,7 +210,7 @@ WRONG = [
 def test_wrong_frames_are_refused_on_their_line(frames: str, points: str, line: int, message: str) -> None:
     with pytest.raises(InputError) as caught:
         read(points, frames=f"frames:\n{frames}")
-    problem = caught.value.problems[0]
+    (problem,) = caught.value.problems
     assert message in problem.message
     assert problem.place is not None
     assert problem.place.line == line
