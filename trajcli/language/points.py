@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Annotated, Any, ClassVar
@@ -39,7 +40,7 @@ _LONGEST_CHAIN = 100  # points, each relative to the next
 _Fields = dict[str, Any]
 
 
-class ListOrRecorded:
+class ListOrRecorded(ABC):
     """Lets a mapping, such as {csv: PATH}, stand for a list of places.
 
     Attributes:
@@ -60,14 +61,15 @@ class ListOrRecorded:
             ),
         )
 
+    @abstractmethod
     def from_mapping(self, value: Mapping[str, Any], context: ReadingContext) -> Any:  # noqa: ANN401
         """Return what a mapping of a job stands for.
 
         Raises:
             FlawError: When it stands for nothing.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def written(
         self,
         value: Any,  # noqa: ANN401
@@ -75,7 +77,6 @@ class ListOrRecorded:
         context: ReadingContext,
     ) -> Any:  # noqa: ANN401
         """Return what is recorded as a job writes it."""
-        raise NotImplementedError
 
     def _read(
         self,
