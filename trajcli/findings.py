@@ -163,17 +163,26 @@ class _Key(NamedTuple):
 _Group = tuple[FindingSeverity, Certainty]
 
 
+class _Offence(NamedTuple):
+    size: float
+    alike: int
+    move: int
+    made: Callable[[], Finding]
+
+
 class Collector:
     """The worst finding of each kind, joint and move, and how many there are like it."""
 
-    def __init__(self, same: float = 1e-12) -> None:
+    def __init__(self, same: float = 1e-12, *, by_move: bool = True) -> None:
         """Begin with none.
 
         Args:
             same: Relative: of offences that differ by less the first one is kept.
+            by_move: Whether each move has a worst finding. If not, the worst of all moves is made when it is
+                asked for, and what it is made from is kept: for motions that are seen in few parts.
         """
-        self._same = same
-        self._worst: dict[_Key, dict[_Group, tuple[float, int, Finding]]] = {}
+        self._same, self._by_move = same, by_move
+        self._worst: dict[_Key, dict[_Group, _Offence]] = {}
 
     def add(
         self,
@@ -202,18 +211,32 @@ class Collector:
             chosen: Which of them count, shape (m,); all unless given.
         """
         index = np.arange(joints.size) if chosen is None else np.flatnonzero(chosen)
-        places = np.stack([joints, np.broadcast_to(moves, joints.shape)], axis=1)[index]
-        for joint, move in sorted(set(map(tuple, places.tolist()))):
-            own = index[(places == (joint, move)).all(axis=1)]
-            first = self._first_worst(own, excess[own])
-            groups = self._worst.setdefault(_Key(kind, quantity, joint, move), {})
-            before = groups.get((severity, certainty))
-            size = float(excess[first])
-            if before is not None and not size > before[0] + self._same * abs(before[0]):
-                groups[severity, certainty] = (before[0], before[1] + own.size, before[2])
-            else:
-                count = own.size + (before[1] if before else 0)
-                groups[severity, certainty] = (size, count, make(first))
+        of_moves = np.broadcast_to(moves, joints.shape)
+        keyed = np.stack([joints, of_moves if self._by_move else np.full_like(joints, -1)], axis=1)[index]
+        for joint, key_move in sorted(set(map(tuple, keyed.tolist()))):
+            own = index[(keyed == (joint, key_move)).all(axis=1)]
+            move = of_moves[own[int(excess[own].argmax())]]
+            own = own[of_moves[own] == move]
+            groups = self._worst.setdefault(_Key(kind, quantity, joint, key_move), {})
+            first, before = self._first_worst(own, excess[own]), groups.get((severity, certainty))
+            here = before if before is not None and before.move == move else None
+            count = own.size + (here.alike if here else 0)
+            if before is None or float(excess[first]) > self._to_pass(before, here):
+                made = self._maker(make, first)
+                groups[severity, certainty] = _Offence(float(excess[first]), count, int(move), made)
+            elif here is not None:
+                groups[severity, certainty] = here._replace(alike=count)
+
+    def _to_pass(self, before: _Offence, here: _Offence | None) -> float:
+        """Return above what an offence is worse than one before: of equals in a move the first is kept."""
+        return before.size + (self._same * abs(before.size) if here else 0.0)
+
+    def _maker(self, make: Make, first: int) -> Callable[[], Finding]:
+        """Return what makes the finding of an offence; of many moves it is made now: its rows may go then."""
+        if not self._by_move:
+            return lambda: make(first)
+        finding = make(first)
+        return lambda: finding
 
     def _first_worst(self, own: NDArray[np.intp], excess: NDArray[np.float64]) -> int:
         """Return the first of some offences whose excess is the largest up to rounding."""
@@ -222,76 +245,15 @@ class Collector:
         return int(own[int((excess >= enough).argmax())])
 
     def findings(self) -> Iterator[Finding]:
-        """Yield for each kind, joint and move the worst of those that are most certain."""
-        for key, groups in self._worst.items():
-            group = min(groups, key=lambda group: (group[0] != "error", group[1] != "exceeded"))
-            _, count, finding = groups[group]
-            yield replace(
-                finding,
-                severity=group[0],
-                certainty=group[1],
-                count=count,
-                move=None if key.move < 0 else key.move,
-            )
-
-
-class WorstByJoint(Collector):
-    """The worst finding of each kind and joint in all moves, made only when it is asked for.
-
-    It keeps what its findings are made from: it is for motions that are seen in few parts.
-    """
-
-    def __init__(self, same: float = 1e-12) -> None:
-        """Begin with none."""
-        super().__init__(same)
-        self._found: dict[tuple[_Key, _Group], _Offence] = {}
-
-    def add(
-        self,
-        kind: str,
-        moves: NDArray[np.int64] | int,
-        joints: NDArray[np.intp],
-        excess: NDArray[np.float64],
-        make: Make,
-        *,
-        quantity: str | None = None,
-        severity: FindingSeverity = "error",
-        certainty: Certainty = "exceeded",
-        chosen: NDArray[np.bool_] | None = None,
-    ) -> None:
-        """Add offences of one kind, as `Collector` does."""
-        index = np.arange(joints.size) if chosen is None else np.flatnonzero(chosen)
-        of_moves = np.broadcast_to(moves, joints.shape)
-        for joint in sorted(set(joints[index].tolist())):
-            own = index[joints[index] == joint]
-            move = of_moves[own[int(excess[own].argmax())]]
-            own = own[of_moves[own] == move]
-            first = self._first_worst(own, excess[own])
-            key, size = (_Key(kind, quantity, joint, -1), (severity, certainty)), float(excess[first])
-            before, count = self._found.get(key), own.size
-            if before is not None and before.move == move:
-                size -= self._same * abs(before.size)
-                count += before.alike
-            if before is None or size > before.size:
-                self._found[key] = _Offence(float(excess[first]), count, int(move), make, first)
-            elif before.move == move:
-                self._found[key] = before._replace(alike=count)
-
-    def findings(self) -> Iterator[Finding]:
-        """Yield for each kind and joint the worst of each severity and certainty."""
-        for (_, (severity, certainty)), found in self._found.items():
-            yield replace(
-                found.make(found.first),
-                severity=severity,
-                certainty=certainty,
-                count=found.alike,
-                move=None if found.move < 0 else found.move,
-            )
-
-
-class _Offence(NamedTuple):
-    size: float
-    alike: int
-    move: int
-    make: Make
-    first: int
+        """Yield the worst of those that are most certain; of all moves together also the less certain."""
+        for groups in self._worst.values():
+            certain = min(groups, key=lambda group: (group[0] != "error", group[1] != "exceeded"))
+            for group in [certain] if self._by_move else groups:
+                found = groups[group]
+                yield replace(
+                    found.made(),
+                    severity=group[0],
+                    certainty=group[1],
+                    count=found.alike,
+                    move=None if found.move < 0 else found.move,
+                )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from trajcli.columns import Group, joint_factors
 from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.piecewise import Array
-from trajcli.findings import Collector, Finding, WorstByJoint, at_time
+from trajcli.findings import Collector, Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.grids import AT_BREAK, NANOSECOND, Grid, KnotGrid, ListedGrid, UniformGrid
 from trajcli.judge.judgement import Judgement, as_planned
@@ -355,13 +355,13 @@ class _Collectors:
     def __init__(self, together: bool) -> None:
         self.together = together
         self._all = Collector()
-        self._of_robots: dict[int, tuple[Robot, WorstByJoint]] = {}
+        self._of_robots: dict[int, tuple[Robot, Collector]] = {}
 
     def of(self, robot: Robot) -> Collector:
         """Return the collector of moves with the limits of a robot."""
         if not self.together:
             return self._all
-        return self._of_robots.setdefault(id(robot), (robot, WorstByJoint()))[1]
+        return self._of_robots.setdefault(id(robot), (robot, Collector(by_move=False)))[1]
 
     def findings(self) -> Iterator[Finding]:
         """Yield what was found."""
