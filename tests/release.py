@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -70,6 +71,9 @@ def main() -> None:
             print(f"== {what}")
             programs = environment(folder / what, *installed)
             run(sys.executable, ROOT / "tests/smoke.py", programs / "trajcli", *(["--slim"] if slim else []))
+            if not slim:
+                os.environ["TRAJCLI_COMMANDS"] = str(programs)
+                run(sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "tests/test_ci_use.py")
 
 
 if __name__ == "__main__":

@@ -34,12 +34,17 @@ def break_one() -> None:
     job.write_text(job.read_text().replace("moves:", "limits: {velocity: 1e-3}\nmoves:"))
 
 
+def commands() -> str:
+    """Return the folder of the program that is tried: `make release-check` names that of the built wheel."""
+    return os.environ.get("TRAJCLI_COMMANDS") or str(warm_commands())
+
+
 def run(command: list[str], **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         command,
         capture_output=True,
         text=True,
-        env={**os.environ, "PATH": f"{warm_commands()}:{os.environ['PATH']}", **environment},
+        env={**os.environ, "PATH": f"{commands()}:{os.environ['PATH']}", **environment},
         timeout=60,
         check=False,
     )
