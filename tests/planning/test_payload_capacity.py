@@ -155,6 +155,41 @@ def test_of_several_payloads_one_or_all() -> None:
     assert payload_capacity(job_from_text(other)).mass == pytest.approx(alone, rel=1e-6)
 
 
+FLOWN = (
+    HEAD
+    + """
+limits: {jerk: 3000, effort: {a: 90, b: [-40, 30]}}
+zone: 40
+start: {joints: [60, 20]}
+moves:
+  - {attach: {mass: MASS}}
+  - {planner: jerk_limited, to: {joints: [20, 20]}}
+  - {planner: jerk_limited, to: {joints: [60, 80]}}
+"""
+)
+
+
+@pytest.mark.full
+def test_what_flies_by_corners_carries_what_it_could_hold_with_stops(monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    """On both lines gravity pulls most in the corner: there the second joint can hold 30 N m."""
+    flown, planned = plan_module.plan_job, list[bool]()
+
+    def counted(loaded, *rest, **fields):  # type: ignore[no-untyped-def]
+        planned.append(loaded.job.names_zones)
+        return flown(loaded, *rest, **fields)
+
+    monkeypatch.setattr("trajcli.planning.payload_capacity.plan_job", counted)
+    found = payload_capacity(job_from_text(FLOWN.replace("MASS", "1")))
+    arm = 9.81 * np.cos(np.radians(40))
+    assert found.mass == pytest.approx((30 - 2 * 0.2 * arm) / (0.4 * arm), rel=1e-6)
+    assert (found.joint, found.limit) == ("b", 30)
+    assert planned.count(True) == 2  # on both sides of what can be held with stops
+    assert not verifies(FLOWN, float(found.mass or 0) * (1 + 1e-6))
+    unlimited = FLOWN.replace("MASS", "1").replace(", effort: {a: 90, b: [-40, 30]}", "")
+    with pytest.raises(InputError, match="no limit of effort"):
+        payload_capacity(job_from_text(unlimited))
+
+
 def test_an_arm_in_the_horizontal_that_rests_carries_anything() -> None:
     text = EMPTY.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
     text = text[: text.index("moves:")] + "moves: [{planner: hold, duration: 1}]\n"

@@ -448,6 +448,12 @@ class Job(Model):
         """Whether a zone is named, for all corners or for one."""
         return self.zone is not None or any(move.zone is not None for move in self.moves)
 
+    def with_stops(self) -> Job:
+        """Return the job that stops at every corner."""
+        stop = {"zone": None}
+        moves = [move if move.zone is None else move.model_copy(update=stop) for move in self.moves]
+        return self.model_copy(update={**stop, "moves": moves})
+
     @property
     def has_signals(self) -> bool:
         """Whether any move sets a signal."""

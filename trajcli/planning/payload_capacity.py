@@ -81,12 +81,9 @@ def payload_capacity(
     """
     alone = partial(plan_job, advise=False, known=KnownMoves())  # most moves are the same with every mass
     search = _Search(loaded, _carriers(loaded, at), planned or alone)
-    feasible, plan = search.feasible_mass()
-    search.require_limits(plan)
-    low, high = search.bracket(feasible, plan)
+    low, high = search.bracket_of_stops() or search.bracket()
     if high is None:
         return PayloadCapacity(None, search.template, search.moves)
-    low, high = search.closed(low, high)
     return search.result(low, high)
 
 
@@ -164,7 +161,36 @@ class _Search:
             message = "no limit of effort is in force, so there is no largest payload"
             raise InputError(Problem(message, hint, place))
 
-    def bracket(self, feasible: float, plan: Plan) -> tuple[float, float | None]:
+    def bracket(self) -> tuple[float, float | None]:
+        """Return a mass that verifies and one above it, as near as they get, that does not; None: any does.
+
+        Raises:
+            InputError: When no effort is limited where the payload is carried.
+            TrajcliError: Of the job without the payload.
+        """
+        feasible, plan = self.feasible_mass()
+        self.require_limits(plan)
+        low, high = self._bracket(feasible, plan)
+        return (low, None) if high is None else self.closed(low, high)
+
+    def bracket_of_stops(self) -> tuple[float, float | None] | None:
+        """Return the bracket of the job with stops, where both its ends hold for the one that flies, too.
+
+        Motions through zones are slowed until they keep efforts, and else the arm stops: what it can carry is
+        what it can carry with stops, as a rule, which is looked for in a fraction of the time.
+        """
+        if not self._loaded.job.names_zones:
+            return None
+        stopping = replace(self._loaded, job=self._loaded.job.with_stops())
+        try:
+            low, high = _Search(stopping, self._carriers, self._planned).bracket()
+        except TrajcliError:
+            return None
+        if not self.passes(LARGEST if high is None else low) or (high is not None and self.passes(high)):
+            return None
+        return low, high
+
+    def _bracket(self, feasible: float, plan: Plan) -> tuple[float, float | None]:
         """Return a mass that verifies and one above it that does not; None where any does."""
         low = feasible
         guesses = sorted(mass for mass in self._guesses(plan) if feasible < mass < LARGEST)
