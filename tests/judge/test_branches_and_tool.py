@@ -226,3 +226,26 @@ def test_a_path_that_ends_where_it_starts_is_followed_from_place_to_place() -> N
     q, row = rows.q.copy(), len(rows) - 3
     q[row] += np.linalg.solve(arm.jacobian(q[row]), [2e-4, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert deviations(q) == [(row + 1, pytest.approx(2e-4, rel=1e-2))]
+
+
+@pytest.mark.parametrize("back", [[0.4, 0.1, 0.25], [0.42, 0.13, 0.25]])
+def test_a_path_that_turns_back_is_followed_around_its_corner(back: list[float]) -> None:
+    """Beside a sharp corner both sides are as near; the way back is told from the way there by the turned tool."""
+    segments = [{"line": {"xyz": [0.5, 0.1, 0.25]}}, {"line": {"xyz": back, "rpy": [np.pi, 0.4, 0]}}]
+    move = {**SQUARE["moves"][0], "segments": segments, "law": {"shape": "quintic"}}
+    limits = {"tcp": {"speed": 0.25, "acceleration": 1.0, "angular_speed": 1.0}}
+    made, rate = trajcli.plan({**SQUARE, "limits": limits, "moves": [move]}), 500
+    robot, rows = made.moves[0].robot, made.trajectory.sample(rate)
+    paths, off = {0: made.moves[0].planned.tool}, np.full(6, 0.5e-9)
+    required = Requirements(robot, tool=lambda: ToolJudge(robot, paths))
+
+    def deviations(q: np.ndarray, qd: np.ndarray) -> list[float | None]:
+        resolution, moves = Resolution(0.5e-9, off, off, off), np.zeros(len(q), int)
+        motion = RecordedMotion(rows.t, q, qd, rows.qdd, None, None, moves, None, resolution, "rows")
+        found = judge_motion(lambda: [motion], required).findings
+        return [each.value for each in found if each.kind == "deviation"]
+
+    assert deviations(rows.q, rows.qd) == []
+    q, row = rows.q.copy(), len(rows) // 2 + 20  # behind the corner: a fault there is on neither side
+    q[row] += np.linalg.solve(trajcli.load_robot("ur5e").jacobian(q[row]), [0.0, 0.0, 3e-5, 0.0, 0.0, 0.0])
+    assert max(value or 0.0 for value in deviations(q, rows.qd)) == pytest.approx(3e-5, rel=0.05)

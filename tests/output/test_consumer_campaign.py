@@ -14,7 +14,7 @@ from tiers import few
 
 from trajcli.curves.operations import scale_time
 from trajcli.errors import InputError, PlanningError, VerificationError
-from trajcli.grids import UniformGrid
+from trajcli.grids import KnotGrid, UniformGrid
 from trajcli.job.read import job_from_text
 from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
 from trajcli.planning.plan import Plan, plan_job
@@ -89,6 +89,15 @@ def test_no_smaller_stretch_of_the_whole_does_it(number: int) -> None:
         first = plan_job(job_from_text(json.dumps(job | {"when_over_limit": "slow"})))
     longer = round((made.plan.trajectory.duration - first.trajectory.duration) * rate)
     assert all(over_when_stretched(made, first, periods, rate) for periods in few(range(longer), 3))
+
+
+@pytest.mark.full
+def test_a_path_with_a_sharp_corner_is_written_at_its_knots() -> None:
+    """The way back from a corner was judged against the way to it, 0.2 mrad off."""
+    made = delivered(58, "ros-jtc")
+    assert made is not None
+    assert made.keeps
+    assert isinstance(made.grid, KnotGrid)
 
 
 def test_consumers_get_rows_inside_all_limits() -> None:

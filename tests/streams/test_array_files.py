@@ -42,6 +42,16 @@ def test_numpy_reads_what_is_written(ending: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(motion.t, ROWS[:, 0])
 
 
+@pytest.mark.parametrize("ending", ["npy", "npz"])
+def test_signals_keep_their_names(ending: str, tmp_path: Path) -> None:
+    file = tmp_path / f"a.{ending}"
+    columns = columns_of(("t", "q", "zone", "signals", "move"), ("revolute",) * 2, Units(), ["glue", "air"])
+    write_verified(file, iter([ROWS[:, : len(columns)]]), columns)
+    found = np.load(file)
+    np.testing.assert_array_equal(found["signal.glue"], ROWS[:, 4])
+    np.testing.assert_array_equal(found["signal.air"], ROWS[:, 5])
+
+
 def test_a_pipe_gets_the_same_bytes(tmp_path: Path) -> None:
     class Pipe(io.BytesIO):
         def seekable(self) -> bool:

@@ -50,6 +50,7 @@ class RecordedPath:
         self._sign = 0.0
         step = self._path.length / _SAMPLES
         self._slack, self._near = 2.0 * step, step**2  # samples beside a place, and squared distances alike
+        self._limits = np.array([motion.tolerance.position, motion.tolerance.angle])
         self._fast = float(peaks(motion.law, (1,))[0].magnitude[0])
         self._before: tuple[float, Array, float] | None = None  # place, coordinates and time of a row
 
@@ -99,18 +100,42 @@ class RecordedPath:
         """Judge rows, or what lies behind rows of known s by some seconds; return their s (N,)."""
         poses, jacobians = linearisation(self._robot, q)
         s = self._nearest(poses, t, before)
-        target = self._path.at_s(s, "right").target()
-        off, split = residuals(target, poses), sum(target.position)
-        sizes = np.linalg.norm(off[:, :split], axis=1), np.linalg.norm(off[:, split:], axis=1)
-        tolerance = self._motion.tolerance
-        for quantity, size, limit in zip(
-            ("position", "orientation"), sizes, (tolerance.position, tolerance.angle), strict=True
-        ):
+        sizes, limits = self._sizes(s, poses), self._limits
+        self._across_corners(s, sizes, poses)
+        for quantity, size, limit in zip(("position", "orientation"), sizes.T, limits, strict=True):
             self._add(quantity, size, limit, t, numbers, slack)
+        target = self._path.at_s(s, "right").target()
         of_rows = determinants(target, poses, jacobians, self._arm)
         if of_rows is not None:
             self._watch_branch(np.sign(of_rows), t, numbers)
         return s
+
+    def _sizes(self, s: Array, poses: Array) -> Array:
+        """Return how far the tool is from places of the path, m, and turned from there, rad, shape (N, 2)."""
+        target = self._path.at_s(s, "right").target()
+        off, split = residuals(target, poses), sum(target.position)
+        return np.stack([np.linalg.norm(part, axis=1) for part in (off[:, :split], off[:, split:])], axis=1)
+
+    def _across_corners(self, s: Array, sizes: Array, poses: Array) -> None:
+        """Put rows that are beside the path on the other side of the nearest corner, where they are nearer.
+
+        Both sides of a sharp corner are as near as the samples are apart, and further on, too, where a path
+        comes back on its own way: only the orientation tells them apart.
+
+        Args:
+            s: Their places, shape (N,): some are replaced.
+            sizes: What they are off there, shape (N, 2): likewise.
+            poses: Of the tool, shape (N, 4, 4).
+        """
+        inner = self._path.breaks[1:-1]
+        beside = np.flatnonzero(exceeds(sizes, self._limits).any(axis=1))
+        if not (beside.size and inner.size):
+            return
+        corner = inner[np.abs(s[beside, None] - inner).argmin(axis=1)]
+        other = self._refined(np.clip(2.0 * corner - s[beside], 0.0, self._path.length), poses[beside])
+        found = self._sizes(other, poses[beside])
+        nearer = (found / self._limits).max(axis=1) < (sizes[beside] / self._limits).max(axis=1)
+        s[beside[nearer]], sizes[beside[nearer]] = other[nearer], found[nearer]
 
     def _nearest(self, poses: Array, t: Array, before: tuple[Array, Array] | None) -> Array:
         """Return the values of s (N,) at which the path is nearest to the tool, each near the one before."""
@@ -126,7 +151,11 @@ class RecordedPath:
         else:
             far = np.abs(self._s - before[0][:, None]) > (self._slack + self._fast * before[1])[:, None]
             s = self._s[np.where(far, np.inf, square).argmin(axis=1)]
-        step = self._path.length / _SAMPLES
+        return self._refined(s, poses)
+
+    def _refined(self, s: Array, poses: Array) -> Array:
+        """Return the values of s (N,) at which the path is nearest to the tool, from values beside them."""
+        turning, step = self._path.poses.pure_rotation, self._path.length / _SAMPLES
         both = np.clip(s + _ASIDE * np.array([[-step], [step]]), 0.0, self._path.length)
         left, right = (
             np.linalg.norm(self._apart(self._path.at_s(side, "right").poses, poses, turning=turning), axis=1)
@@ -145,7 +174,8 @@ class RecordedPath:
     def _followed(self, square: Array, own: Array, t: Array) -> NDArray[np.intp]:
         """Return the indices of the nearest samples, each no further from the one before than the tool moves.
 
-        A path may pass a place twice, or end where it starts: of the first row the earliest place counts.
+        A path may pass a place twice, or end where it starts: of the first row the earliest place counts, and
+        behind it, of places that are as near, the one to which the tool gets when it goes on along the path.
 
         Args:
             square: Squared distances of rows from samples, shape (N, samples).
@@ -164,7 +194,11 @@ class RecordedPath:
                 moved = float(np.linalg.norm(coordinates - last))
                 reach = _FURTHER * moved + self._fast * (float(t[k]) - time) + self._slack
                 low, high = np.searchsorted(self._s, [at - reach, at + reach])
-                found[k] = low + square[k, low : max(high, low + 1)].argmin()
+                window = square[k, low : max(high, low + 1)]
+                near = low + np.flatnonzero(window <= window.min() + self._near)
+                onward = near[self._s[near] >= at]
+                near = onward if onward.size else near
+                found[k] = near[np.abs(self._s[near] - at - moved).argmin()]
             self._before = float(self._s[found[k]]), coordinates, float(t[k])
         return found
 

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from trajcli.columns import Column, group_of, require_finite
+from trajcli.columns import SIGNALS, Column, group_of, require_finite
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 
@@ -121,17 +121,18 @@ def _arrays(blocks: Sequence[Array], columns: Sequence[Column]) -> dict[str, Arr
 
 
 def _dtype(columns: Sequence[Column]) -> np.dtype[Any]:
-    """Return the type of a row: a field for each group of columns.
+    """Return the type of a row: a field for each group of columns, and for each signal, which has a name.
 
     Raises:
         TrajcliError: When the columns of a group do not stand together.
     """
     counts: dict[str, int] = {}
-    for before, column in zip((None, *columns), columns, strict=False):
-        group = group_of(column)
-        if group in counts and (before is None or group_of(before) != group):
+    last = ""
+    for column in columns:
+        group = column.kind if group_of(column) == SIGNALS else group_of(column)
+        if group in counts and last != group:
             raise TrajcliError(f"the columns {group} stand apart")
-        counts[group] = counts.get(group, 0) + 1
+        counts[group], last = counts.get(group, 0) + 1, group
     alone = {column.kind for column in columns if column.joint is None}
     fields: list[Any] = [(g, "<f8") if g in alone else (g, "<f8", (count,)) for g, count in counts.items()]
     return np.dtype(fields)

@@ -37,7 +37,7 @@ def test_examples_are_known_by_their_rows(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.yaml")), ids=lambda path: path.stem)
-@pytest.mark.parametrize("ending", ["csv", "jsonl", "mcap", "yaml"])
+@pytest.mark.parametrize("ending", ["csv", "jsonl", "mcap", "yaml", "npy", "npz"])
 def test_every_example_is_known_in_every_format(path: Path, ending: str, tmp_path: Path) -> None:
     plan, file = planned(path), tmp_path / f"rows.{ending}"
     write_plan(plan, str(file))
