@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from tiers import few
 
+from trajcli.job.explanation import Explanation
 from trajcli.job.read import job_from_text
+from trajcli.job.report import Report
+from trajcli.job.reports.part import MeasuredIn, ReportPart
 from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
 from trajcli.planning.plan import plan_job
@@ -170,3 +174,22 @@ def test_a_report_stays_in_si() -> None:
     for joint, unit in (("slide", "m"), ("turn", "rad")):
         of_joint = [peak["unit"] for peak in user["moves"][0]["peaks"] if peak["joint"] == joint]
         assert of_joint == [unit, f"{unit}/s", f"{unit}/s^2", f"{unit}/s^3"]
+
+
+def parts(kind: type[ReportPart] = ReportPart) -> Iterator[type[ReportPart]]:
+    for part in kind.__subclasses__():
+        yield part
+        yield from parts(part)
+
+
+def test_every_number_in_si_says_which_field_names_its_unit() -> None:
+    reports = [part for part in parts() if part.__module__.startswith("trajcli.job")]
+    assert {Report, Explanation} <= set(reports)
+    fields = [(part, name, field) for part in reports for name, field in part.model_fields.items()]
+    bare = [
+        f"{part.__name__}.{name}"
+        for part, name, field in fields
+        if re.search(r"\bSI\b", field.description or "") and "float" in str(field.annotation)
+        if not any(isinstance(each, MeasuredIn) for each in field.metadata)
+    ]
+    assert bare == []

@@ -82,6 +82,7 @@ def test_a_named_cure_cures() -> None:
     report = rows_report(rows, judged)
     assert (report.verdict, report.interpolation, report.rate_that_keeps) == ("exceeded", "quintic", None)
     assert report.worst is not None
+    assert (report.worst.kind, report.worst.unit) == ("jerk", "rad/s^3")
     assert report.worst.value / report.worst.limit == pytest.approx(factor_by_scipy(plan), rel=2e-3)
 
 

@@ -384,8 +384,9 @@ class WorstOfRows(ReportPart):
     move: int | None
     row: Annotated[int, Field(description="The row that it stands at, or behind; from 1.")]
     time: Annotated[float, Field(description="Of that row, s, as written.")]
-    value: Annotated[float, Field(description="SI.")]
-    limit: Annotated[float, Field(description="SI.")]
+    value: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    limit: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    unit: UnitName
 
 
 class RowsReport(ReportPart):

@@ -77,7 +77,7 @@ def rows_report(rows: JoinedRows, judged: Judgement) -> RowsReport:
     return RowsReport(
         interpolation=judged.interpolation,
         verdict="exceeded",
-        worst=WorstOfRows.model_validate(worst),
+        worst=WorstOfRows.model_validate(worst.said_by(rows.plan.loaded.say)),
         rate_that_keeps=rate_that_keeps(rows),
     )
 
