@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 _QUOTED = 100  # characters of a text in messages
 _LONGEST = 64  # characters: nobody mistypes more, and difflib's time grows with the square
-_LISTED = 12
+_LISTED = 24
 
 
 def abridged(text: str) -> str:

@@ -280,3 +280,21 @@ def test_the_schema_describes_every_key(name: str, capfd: Capture) -> None:
     assert [error.message for error in Draft202012Validator(schema).iter_errors(json.loads(text))] == []
     move = schema["$defs"]["ExplainedMove"]["properties"]
     assert all(move[key]["description"] for key in ("knots", "blends", "closed_form_derivatives"))
+
+
+def test_more_pieces_than_a_person_reads_are_counted(capfd: Capture, job: Path) -> None:
+    dense = [{"joints": [0.1 * k + 0.03 * (k % 3)], "time": k} for k in range(1, 130)]
+    move = {"planner": "spline", "through": dense, "to": {"joints": [14], "time": 130}}
+    write(job, {"joints": [0]}, move)
+    code, out, err = call(capfd, "explain", str(job))
+    assert code == 0, err
+    pieces = 130 + 2  # with those of two virtual points
+    assert f"\n  q1(t): {pieces} pieces of degree 3, listed by --json\n" in out
+    assert len(move_of(capfd, job)["polynomials"]["j1"]) == pieces
+
+
+def test_fits_of_high_degree_are_not_printed(capfd: Capture) -> None:
+    code, out, _ = call(capfd, "explain", str(EXAMPLES / "signals.yaml"))
+    assert code == 0
+    assert "pieces of degree 20, listed by --json" in out
+    assert "t^11" not in out

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
+from trajcli.planning.plan import plan_job
 
 JOB = """version: 1
 robot: {joints: 1}
@@ -43,6 +46,13 @@ def problems(text: str) -> list[tuple[int, str]]:
         ),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "mark: here", 5, "a move has a `label`"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "gripper: 1", 5, "attach and detach"),
+        ("duration: 1", "duration: 1, io: 4", 5, "`at: {signal: NAME, value: 1}` in the move before"),
+        (
+            "cubic, to: {joints: [1]}",
+            "spline, through: [{joints: [0.5], time: 0.5}], to: {joints: [1]}, times: [0, 1]",
+            5,
+            "a point of `through` has its own: {joints: ..., time: ...}",
+        ),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "goto: a", 5, "{planner: jerk_limited, to: a}"),
         ("{planner: cubic, to: {joints: [1]}, duration: 1}", "wait", 5, "{planner: hold, duration: ...}"),
         ("{planner: cubic, to: {joints: [1]}, duration: 1}", "[1, 2]", 5, "{planner: ..., to: ...}"),
@@ -141,3 +151,17 @@ moves:
     assert not [event for event in plan_job(job_from_text(meant)).events if event.kind == "units"]
     with_unit = text.replace("[180, 0, 0]", '["180 deg", 0, 0]')
     assert not [event for event in plan_job(job_from_text(with_unit)).events if event.kind == "units"]
+
+
+@pytest.mark.parametrize("place", ["between moves", "in a move"])
+def test_what_is_said_of_signals_works(place: str) -> None:
+    move = "{planner: cubic, to: {joints: [1]}, duration: 1}"
+    (found,) = problems(JOB.replace(move, "{gripper: 1}"))
+    entry, beside = (
+        text.replace("NAME", "grip") for text in re.findall(r"`([^`]+)`", found[1].split(" | ")[1])
+    )
+    new = (
+        f"{move}\n  {entry}" if place == "between moves" else move.replace("duration", f"{beside}, duration")
+    )
+    loaded = job_from_text(JOB.replace(move, new))
+    assert [signal.name for signal in plan_job(loaded).trajectory.signals] == ["grip"]

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from trajcli.job.explanation import BlendReport, ExplainedMove, PolynomialReport
 
 _MOST_LAW_PIECES = 40  # pieces of a law that are listed
-_MOST_PIECES = 100  # of a joint that are listed
+_MOST_PIECES = 120  # of all joints that are listed
+_HIGHEST = 9  # degree of polynomials that are listed: higher ones are fits, which nobody evaluates by hand
 _MOST_KNOTS = 120  # of all joints, or parabolas, that are listed
 _CANCELS = 1e4  # times larger than what they add up to: of ten digits, six are left
 _DOTS = ("", "d", "dd")
@@ -77,16 +78,18 @@ def polynomial_lines(move: ExplainedMove) -> Iterator[str]:
         degree = len(joints[0][0].local) - 1
         yield f"  joints: {len(move.breaks) - 1} pieces of degree {degree}, listed by --json"
         return
-    counts = {len(rows) for rows in joints}
-    if len(joints) > 1 and len(counts) == 1 and min(counts) > _MOST_PIECES:
-        yield f"  q1(t) .. q{len(joints)}(t): {min(counts)} pieces each, listed by --json"
+    counts, highest = (
+        [len(rows) for rows in joints],
+        max(len(row.local) - 1 for rows in joints for row in rows),
+    )
+    if sum(counts) > _MOST_PIECES or highest > _HIGHEST:
+        names = f"q1(t) .. q{len(joints)}(t)" if len(joints) > 1 else "q1(t)"
+        each = f"{counts[0]} pieces{' each' if len(joints) > 1 else ''}" if len(set(counts)) == 1 else ""
+        yield f"  {names}: {each or f'{sum(counts)} pieces'} of degree {highest}, listed by --json"
         return
     for number, rows in enumerate(joints, 1):
-        if len(rows) > _MOST_PIECES:
-            yield f"  q{number}(t): {len(rows)} pieces, listed by --json"
-        else:
-            yield from _function(rows, "q", str(number))
-    if move.origin and max(counts) <= _MOST_PIECES:
+        yield from _function(rows, "q", str(number))
+    if move.origin:
         yield f"  in unshifted time u = t - {move.origin:.10g}:"
         for number, rows in enumerate(joints, 1):
             yield from _unshifted(rows, f"q{number}", move.origin)

@@ -86,15 +86,15 @@ _ENTRIES_ELSEWHERE = {
     ),
     **dict.fromkeys(
         ("io", "output", "signal", "set", "gripper", "grip", "open", "close", "event"),
-        "a job has only motions: what happens between moves is done where the column `move` of the rows "
-        "changes; what the tool then carries is said by attach and detach",
+        "write `- {{signal: NAME, value: 1}}` where the arm stands, or `at: {{signal: NAME, value: 1}}` in "
+        "the move before; what the tool then carries is said by attach and detach",
     ),
     **dict.fromkeys(
         ("goto", "go", "move", "move_to", "moveto"),
         "write `- {{planner: jerk_limited, to: {value}}}`",
     ),
-    "stop": "every move ends at rest unless its target has a velocity; to stand still for 2 s write "
-    "`- {{planner: hold, duration: 2}}`",
+    "stop": "every move ends at rest unless it has a `zone`, or its target a velocity; to stand still for "
+    "2 s write `- {{planner: hold, duration: 2}}`",
 }
 """Entries among the moves of other programs, with what says the same."""
 _NOT_HERE = {
@@ -104,9 +104,11 @@ _NOT_HERE = {
     ),
 }
 """Sections of other programs, with what says the same."""
+_TIMES = ("times", "knots", "time_stamps", "timestamps")
+"""Words for the times of points."""
 _PLANNERS_ELSEWHERE = {
-    "stop": "every move ends at rest unless its target has a velocity; a moving arm is stopped by "
-    "`{planner: jerk_limited, to: {velocity: 0}}`",
+    "stop": "every move ends at rest unless it has a `zone`, or its target a velocity; a moving arm is "
+    "stopped by `{planner: jerk_limited, to: {velocity: 0}}`",
 }
 """Planners of other programs that are more than another name."""
 _NEEDS_NO_LIMIT = "quintic"  # the shape of a law that a duration is enough for
@@ -193,6 +195,8 @@ def _other_key(key: str, names: Sequence[str]) -> str | None:
         return f"did you mean '{meant}'?"
     if meant in LimitsSpec.model_fields and "limits" in names:
         return f"it stands under `limits`: {{{meant}: ...}}"
+    if word in _TIMES and "through" in names:
+        return "a point of `through` has its own: {joints: ..., time: ...}"
     elsewhere = _NOT_HERE.get(word) or _ENTRIES_ELSEWHERE.get(word)
     return did_you_mean(key, names) if elsewhere is None else elsewhere.format(value="...")
 
