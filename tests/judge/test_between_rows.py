@@ -17,7 +17,7 @@ from recorded_rows import bare_robot
 from trajcli.findings import Finding
 from trajcli.judge import joint_limits
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Payload, Robot, unlimited
+from trajcli.kinematics.robot import Friction, Joint, Limits, LinkInertia, Payload, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 PERIOD, PIECES, FAR = 0.008, 9, 1e6
@@ -109,6 +109,20 @@ def test_a_change_of_the_law_explains_so_much(order: int, orders: int, share: fl
         assert "law" not in asked_for.text()
 
 
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("rounding", "severity"), [(0.12, "error"), (0.2, "warning")])
+def test_rounding_adds_to_what_a_change_of_the_law_explains(
+    rounding: float, severity: str, side: int
+) -> None:
+    """The step explains 0.65 of the excess; a velocity is off by 5/2 of what its column is: by 0.3, or by 0.5."""
+    motion = peaked(1, 2, 2.2 * LAW, side)
+    off, exact = np.full(1, rounding * OVER), np.zeros(1)
+    motion = replace(motion, resolution=Resolution(0.0, exact, off, exact))
+    (found,) = over(motion, bare_robot(bounded(1, side, PEAK - OVER)))
+    assert (found.severity, found.certainty) == (severity, "exceeded")
+    assert found.rounding == pytest.approx(2.5 * rounding * OVER, rel=1e-6)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_rows_that_stand_far_apart_explain_nothing(order: int) -> None:
     for period, severity in ((0.01, "warning"), (0.0101, "error")):
@@ -195,13 +209,33 @@ def test_pieces_of_every_degree_are_judged(worst: int, side: int) -> None:
     assert found.time == pytest.approx(peaks.argmax() + 0.5)
 
 
-def test_of_many_pieces_the_worst_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("first", [True, False])
+def test_a_derivative_that_pieces_do_not_determine_is_not_judged(first: bool, side: int) -> None:
+    """Rows without accelerations say nothing of jerk, whatever cubics through them have: -12 d/T^3."""
+    t, cubic = np.arange(8.0), np.arange(8) < 4
+    stated = ~cubic if first else cubic
+    distances = np.where(stated[:-1] & stated[1:], 0.1, -5.0)  # their jerk has the other sign
+    q = side * np.append(0.0, np.cumsum(distances))[:, None]
+    qdd = np.where(stated, 0.0, np.nan)[:, None]
+    motion = motion_of(q, np.zeros_like(q), qdd, t=t)
+    limits = bounded(3, side, 6.1)  # of quintics from rest to rest over 0.1: 60 d/T^3
+    assert over(motion, bare_robot(limits), interpolate="jtc") == []
+    (found,) = over(motion, bare_robot(bounded(3, side, 5.9)), interpolate="jtc")
+    assert (found.kind, found.count) == ("jerk", 3)
+    assert found.value == pytest.approx(side * 6.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("middle", [2.5, 1.9])
+def test_of_many_pieces_the_worst_is_found(middle: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows state more than is allowed nearly everywhere; a piece that ends slower is fastest in between."""
     monkeypatch.setattr(joint_limits, "_MANY", 4)
     t, speed = np.arange(9.0), np.array([2.0, 2, 2, 2, 1.5, 1.5, 2, 0, 0])[:, None]
-    distance = np.array([2.0, 2, 2, 1.75, 2.5, 1.75, 1, 0.65])  # the last one from rest to rest
+    distance = np.array([2.0, 2, 2, 1.75, middle, 1.75, 1, 0.65])  # the last one from rest to rest
     q = np.append(0.0, np.cumsum(distance))[:, None]
-    peak = 1.5 + 1.5 * (2.5 - 1.5)  # of a cubic: the speed at both ends, and 3/2 of what the mean is above it
+    peak = 1.5 + 1.5 * (
+        middle - 1.5
+    )  # of a cubic: the speed at both ends, and 3/2 of what the mean is above it
     limits = bounded(1, 1, 0.9)  # which the last one passes in between only, by 0.075
     (found,) = over(motion_of(q, speed, t=t), bare_robot(limits), interpolate="cubic")
     assert (found.count, found.row) == (8, 5)
@@ -275,6 +309,54 @@ def test_velocities_alone_state_a_force(side: int) -> None:
         (found,) = over(motion_of(q[:, None], qd[:, None], t=t), slides(side, MASS))
         assert (found.kind, found.severity) == ("effort", severity)
         assert found.value == pytest.approx(side * MASS * (mean + 0.2), rel=1e-5)
+
+
+def rubbing(side: int, size: float, friction: Friction) -> Robot:
+    """Return one slide with friction, whose force is limited."""
+    arm = slides(side, size)
+    return replace(arm, joints=(replace(arm.joints[0], friction=friction),))
+
+
+def braked(side: int, speed: float, brake: float) -> RecordedMotion:
+    """Return rows that fall from a speed with one deceleration, to rest where that is long enough."""
+    t = PERIOD * np.arange(8)
+    since = np.minimum(t, speed / brake)
+    q, qd = speed * since - brake * since**2 / 2, speed - brake * since
+    qdd = np.full(8, -brake)
+    return motion_of(*(side * each[:, None] for each in (q, qd, qdd)), t=t)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_friction_of_rows_has_the_direction_and_the_size_of_their_speed(side: int) -> None:
+    """2 kg driven at 1 m/s against 3 N s/m and 0.5 N, with 1 m/s^2 at one row and 0.5 beside it."""
+    t = PERIOD * np.arange(6)
+    qdd = side * np.where(np.arange(6) == 3, 1.0, 0.5)
+    qd = side * 1.0 + np.append(0.0, np.cumsum(PERIOD * (qdd[1:] + qdd[:-1]) / 2))
+    q = np.append(0.0, np.cumsum(PERIOD * (qd[1:] + qd[:-1]) / 2 - PERIOD**2 * np.diff(qdd) / 12))
+    motion = motion_of(*(each[:, None] for each in (q, qd, qdd)), t=t)
+    needed = MASS * 1.0 + 3.0 * abs(qd[3]) + 0.5
+    friction = Friction(coulomb=0.5, viscous=3.0)
+    (found,) = over(motion, rubbing(side, needed - 0.1, friction))
+    assert (found.severity, found.row) == ("error", 4)
+    assert found.value == pytest.approx(side * needed, rel=1e-5)
+    assert over(motion, rubbing(side, needed + 0.01, friction)) == []
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("noise", [0.9, -0.9])
+def test_a_row_at_rest_by_its_decimals_has_the_friction_of_the_motion_beside(noise: float, side: int) -> None:
+    """Braking 2 kg by 10 m/s^2 takes 20 N, 1 N of it by friction: 19 N, and 21 N if the last row went back."""
+    last, off = 7, 1e-5
+    motion = braked(side, PERIOD * last * 10.0, 10.0)
+    qd = motion.qd.copy()
+    qd[last] = side * noise * off
+    exact = np.zeros(1)
+    rounded = replace(motion, qd=qd, resolution=Resolution(0.0, exact, np.full(1, off), exact))
+    errors = [
+        each for each in over(rounded, rubbing(-side, 20.5, Friction(1.0, 0.0))) if each.severity == "error"
+    ]
+    assert errors == []
+    assert over(motion, rubbing(-side, 18.5, Friction(1.0, 0.0)))[0].severity == "error"
 
 
 def test_no_row_says_when_a_payload_changed() -> None:

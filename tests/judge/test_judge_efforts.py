@@ -140,8 +140,9 @@ def test_one_clear_error(rows: Path, options: dict[str, str], message: str) -> N
         check_file(str(rows / "rows.csv"), CheckOptions(**placed))
 
 
+@pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("last", [0.0, -3e-14, -1e-9])
-def test_friction_at_rest_is_that_of_the_motion_before(last: float, tmp_path: Path) -> None:
+def test_friction_at_rest_is_that_of_the_motion_before(last: float, side: int, tmp_path: Path) -> None:
     """1 kg in 0.5 m, I = 0.33 kg m^2, brakes with 10 rad/s^2 and 1 N m of friction: 2.3 of 2.5 N m, and 3.3 without.
 
     Where the braking begins, between two rows, quintics take more than 2.5 N m: that is a warning.
@@ -154,9 +155,10 @@ def test_friction_at_rest_is_that_of_the_motion_before(last: float, tmp_path: Pa
     braked = np.maximum(t - 0.05, 0.0)
     rows = np.column_stack([t, t - 5 * braked**2, 1 - 10 * braked, np.where(braked > 0, -10.0, 0.0)])
     rows[-1, 2] = last
+    rows[:, 1:] *= side
     np.savetxt(tmp_path / "rows.csv", rows, "%.16e", ",", header="t,q1,qd1,qdd1", comments="")
     found = check_file(str(tmp_path / "rows.csv"), CheckOptions(robot=str(tmp_path / "arm.yaml"))).judgement
     (effort,) = (each for each in found.findings if each.kind == "effort")
     assert (effort.severity, effort.certainty, found.verdict) == ("warning", "exceeded", "satisfied")
-    assert -3.3 * 1.6 + 1 < effort.value < -2.5
+    assert -3.3 * 1.6 + 1 < side * effort.value < -2.5
     assert effort.time < 0.06

@@ -191,19 +191,27 @@ def test_speeds_by_position(piece, planted, certainty, side):
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize(("planted", "certainty"), PLANTED)
 @pytest.mark.parametrize("piece", [0, 1, 3])
-def test_forces_of_two_slides(piece, planted, certainty, side):
-    """The first one moves both masses, the second one its own: forces are off by what both accelerations are."""
+@pytest.mark.parametrize("turned", [0.0, np.pi], ids=["along", "against"])
+@pytest.mark.parametrize("limited", [0, 1])
+def test_forces_of_two_slides(limited, turned, piece, planted, certainty, side):
+    """The first one moves both masses, the second one its own: forces are off by what both accelerations are.
+
+    Where the second one slides the other way, its acceleration takes from the force: its error still adds.
+    """
     link = LinkInertia(2.0, (0.0, 0.0, 0.0), (0.0,) * 6), LinkInertia(3.0, (0.0, 0.0, 0.0), (0.0,) * 6)
-    joints = tuple(Joint(f"s{k}", "prismatic", link=link[k]) for k in range(2))
-    q, off = moved_in(piece, 0.5 * side)
+    joints = tuple(Joint(f"s{k}", "prismatic", alpha=k * turned, link=link[k]) for k in range(2))
+    by, off = moved_in(piece, 0.5 * side)
     share = 10 / sqrt(3) / (T[piece + 1] - T[piece]) ** 2
-    rounding = (2 + 3 + 3) * share * 2 * OFF
-    size = 5 * share * 0.5 - planted * rounding
-    effort = np.array([[-np.inf, size] if side > 0 else [-size, np.inf], [-np.inf, np.inf]])
+    mass, together = ((2 + 3, 2 + 3 + 3), (3, 3 + 3))[limited]
+    rounding = together * share * 2 * OFF
+    size = mass * share * 0.5 - planted * rounding
+    effort = np.tile([-np.inf, np.inf], (2, 1))
+    effort[limited] = [-np.inf, size] if side > 0 else [-size, np.inf]
     limits = replace(unlimited(2), effort=effort)
     arm = Robot("slides", joints, limits, "modified", np.eye(4), np.eye(4), gravity=np.zeros(3))
-    both, nothing = np.stack([q, np.zeros(T.size)], axis=1), np.zeros((T.size, 2))
-    found = found_in(rows(both, nothing, nothing, **off), arm, "effort", "quintic")
+    q, nothing = np.zeros((T.size, 2)), np.zeros((T.size, 2))
+    q[:, limited] = by
+    found = found_in(rows(q, nothing, nothing, **off), arm, "effort", "quintic")
     assert (found.certainty, found.severity) == (certainty, "error")
-    assert found.value == pytest.approx(side * 5 * share * 0.5, rel=1e-5)
+    assert found.value == pytest.approx(side * mass * share * 0.5, rel=1e-5)
     assert found.rounding == pytest.approx(rounding, rel=1e-5)

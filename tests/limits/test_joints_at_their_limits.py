@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from trajcli.curves.extrema import Peaks
+from trajcli.curves.extrema import Peaks, peaks_between
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import Amount, PlanningError
 from trajcli.findings import Finding
@@ -134,3 +134,101 @@ def test_only_a_joint_with_such_a_limit_narrows_its_velocities() -> None:
     near, far = np.sqrt(2 * D * np.array([0.5, 2 * END - 0.5])) - OFFSET
     assert high == pytest.approx([near, far])
     assert low == pytest.approx([-far, -near])
+
+
+def several(count: int, bounds: Limits) -> Robot:
+    return Robot("some", tuple(Joint(f"j{k}") for k in range(count)), bounds, None, np.eye(4), np.eye(4))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "limit"), [(-0.8, 10.1, -0.5), (-0.6, 10.3, 10.0), (-0.8, 10.3, None), (-9.0, 9.0, -0.5)]
+)
+def test_of_positions_beyond_both_ends_the_further_one_is_named(
+    low: float, high: float, limit: float
+) -> None:
+    bounds = Limits(np.array([[-0.5, 10.0]]), UNLIMITED, UNLIMITED, UNLIMITED)
+    still = Peaks(*(np.zeros(1) for _ in range(4)))
+    beyond = Peaks(np.array([low]), np.array([0.1]), np.array([high]), np.array([0.2]))
+    (found,) = JointSurvey((beyond, still, still, still), bounds).over(one_joint(bounds))
+    if limit is not None:
+        assert (found.limit, found.value) == (limit, low if limit < 0 else high)
+
+
+@pytest.mark.parametrize("at", [0, 1])
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("name", "rate"), [("velocity", 1), ("acceleration", 2)])
+def test_a_joint_is_over_at_either_end_of_a_move(name: str, rate: int, sign: int, at: int) -> None:
+    """By the rate that is limited, in its direction, and its own one."""
+    ends = [[np.zeros(2) for _ in range(3)] for _ in range(2)]
+    ends[at][rate][1] = sign * 1.5
+    states = [State(*end) for end in ends]
+    arm = several(2, of_velocity(-1.0, 1.0))
+    assert joints.FAMILY.over_at_ends(arm, states, (name, 1, sign * 1.0))
+    assert not joints.FAMILY.over_at_ends(arm, states, (name, 1, sign * 1.6))
+    assert not joints.FAMILY.over_at_ends(arm, states, (name, 1, -sign * 1.0))
+    assert not joints.FAMILY.over_at_ends(arm, states, (name, 0, sign * 1.0))
+    other = "acceleration" if name == "velocity" else "velocity"
+    assert not joints.FAMILY.over_at_ends(arm, states, (other, 1, sign * 1.0))
+    assert not joints.FAMILY.over_at_ends(arm, states, ("jerk", 1, sign * 1.0))
+
+
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize("order", range(3))
+@pytest.mark.parametrize("value", [1.5, -0.7])
+def test_one_joint_of_a_state_beyond_one_limit_is_told(value: float, order: int, joint: int) -> None:
+    bounds = np.tile([-0.5, 1.0], (3, 1))
+    arm = several(3, Limits(bounds, bounds, bounds, np.tile([-np.inf, np.inf], (3, 1))))
+    values = [np.zeros(3) for _ in range(3)]
+    assert joints.FAMILY.why_not_in_state(arm, State(*values)) is None
+    values[order][joint] = value
+    said = joints.FAMILY.why_not_in_state(arm, State(*values))
+    assert said is not None
+    assert said[1]["joint"] == f"j{joint}"
+    assert said[1]["value"] == Amount(value, order, joint)
+    assert said[1]["limit"] == Amount(1.0 if value > 0 else -0.5, order, joint)
+
+
+def test_each_move_is_judged_by_its_own_limits_whoever_shares_them() -> None:
+    """Five moves at 1.5, of which the third and the last allow only 1."""
+    wide, narrow = of_velocity(-2.0, 2.0), of_velocity(-1.0, 1.0)
+    curve = PiecewisePolynomial(
+        np.arange(6.0), np.stack([np.full((5, 1), 1.5), 1.5 * np.arange(5.0)[:, None]])
+    )
+    times = np.stack([np.arange(5.0), np.arange(1.0, 6.0)], axis=1)
+    peaks = peaks_between(curve, times)
+    assert joints.moves_over(peaks, [wide, wide, narrow, wide, narrow]) == [2, 4]
+    assert joints.moves_over(peaks, [narrow, wide, wide, narrow, wide]) == [0, 3]
+
+
+@pytest.mark.parametrize("worst", [0, 1, 2])
+def test_each_joint_that_is_too_fast_near_its_end_counts(worst: int) -> None:
+    uses = [dataclasses.replace(too_fast(), component=k, used=0.5, velocity=0.5) for k in range(3)]
+    arm = several(3, of_position())
+    assert velocity_by_position.ApproachSurvey(()).excess() == -np.inf
+    assert velocity_by_position.ApproachSurvey(tuple(uses)).excess() < 0
+    uses[worst] = dataclasses.replace(too_fast(), component=worst, velocity=-1.5, limit=-1.0)
+    one = velocity_by_position.ApproachSurvey(tuple(uses))
+    assert one.excess() == pytest.approx(0.5)
+    assert [found.joint for found in one.over(arm)] == [f"j{worst}"]
+    every = [dataclasses.replace(too_fast(), component=k) for k in range(3)]
+    assert len(list(velocity_by_position.ApproachSurvey(tuple(every)).over(arm))) == 3
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("joint", range(2))
+def test_a_path_is_refused_for_the_joint_that_may_not_move_at_either_end(joint: int, sign: int) -> None:
+    """Nearer than o^2 / (2 d) = 0.0075 to its end; further away it may, towards either end."""
+    bounds = Limits(*(np.tile(each, (2, 1)) for each in (np.array([[-END, END]]), *[UNLIMITED] * 3)))
+    arm = several(2, dataclasses.replace(bounds, velocity_by_position=np.tile([D, OFFSET], (2, 1))))
+    for near, refused in ((0.005, True), (0.01, False)):
+        moved = np.full(2, 0.1)
+        moved[joint] = sign * (END - near)
+        path = PiecewisePolynomial(np.array([0.0, 1.0]), np.stack([moved[None], np.zeros((1, 2))]))
+        if not refused:
+            assert len(velocity_by_position.FAMILY.path_constraints(path, arm)) == 1
+            continue
+        with pytest.raises(PlanningError) as caught:
+            velocity_by_position.FAMILY.path_constraints(path, arm)
+        (problem,) = caught.value.problems
+        assert problem.joint == f"j{joint}"
+        assert problem.amounts["distance"].value == pytest.approx(near, abs=1e-9)

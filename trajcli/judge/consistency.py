@@ -92,7 +92,8 @@ class Changes:
         inside = (near >= 0) & (near < len(values))
         sizes = np.where(inside, np.abs(values[np.clip(near, 0, len(values) - 1), joint]), 0.0)
         own = sizes[_NEAR].copy()
-        return np.asarray((own >= sizes.max(axis=0)) & (np.sort(sizes, axis=0)[-3] * _ISOLATED <= own))
+        largest = (own > 0.0) & (own >= sizes.max(axis=0))
+        return np.asarray(largest & (np.sort(sizes, axis=0)[-3] * _ISOLATED <= own))
 
 
 def changes_of(window: Intervals) -> list[Changes]:

@@ -1,0 +1,152 @@
+"""Rules of consumers for every joint, direction and derivative, and at the numbers where they begin to be broken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_faults import HOME, judged, motion, with_value
+
+from trajcli.consumers.judgement import judge_by_profile, load_profile
+from trajcli.consumers.rule_check import Surroundings
+from trajcli.findings import Finding
+from trajcli.kinematics.robot import Limits
+from trajcli.streams.recorded_motion import RecordedMotion
+
+SIDES = pytest.mark.parametrize("side", [-1.0, 1.0])
+STILL = np.tile(HOME[7], (21, 1))
+FRANKA = replace(motion(rows=21), q=STILL, qd=np.zeros_like(STILL), qdd=np.zeros_like(STILL))
+
+
+def found(rows: RecordedMotion, profile: str, rule: str) -> list[Finding]:
+    """Return what breaks one rule; the arm stands where the rows begin."""
+    around = Surroundings(rows.joints, rows.q[0])
+    every = judge_by_profile([rows], load_profile(profile), around).findings
+    return [each for each in every if each.rule == rule]
+
+
+@SIDES
+@pytest.mark.parametrize("name", ["q", "qd", "qdd"])
+def test_numbers_beyond_int32_in_either_direction(name: str, side: float) -> None:
+    rows = motion(6, 0.1, 21)
+    own = getattr(rows, name)[10, 1]
+    for beyond in (2147.4837, 2147.4836):
+        planted = with_value(rows, name, 10, 1, side * beyond - own)
+        broken = found(planted, "ur-passthrough", "passthrough-range")
+        assert [each.value for each in broken] == (
+            [pytest.approx(side * beyond)] if beyond > 2147.48365 else []
+        )
+
+
+@SIDES
+@pytest.mark.parametrize("first", [0.0, 12.5])
+@pytest.mark.parametrize(("beside", "broken"), [(0.4e-6, True), (0.1e-6, False)])
+def test_rounding_of_positions_adds_to_what_stamps_make(
+    beside: float, broken: bool, first: float, side: float
+) -> None:
+    """All points come 0.4 us early, at 24.5 rad/s: 9.8e-6 of 1e-5; whenever the stamps begin."""
+    rows = motion(6, 0.1, 21)
+    q, qd = np.tile(HOME[6], (21, 1)), np.zeros((21, 6))
+    q[:, 1], qd[1:, 1] = 1.0 + side * beside, 24.5
+    t = first + 0.1 * np.arange(21) + np.where(np.arange(21) > 0, 4e-7, 0.0)
+    planted = replace(rows, t=t, q=q, qd=qd, qdd=np.zeros_like(q))
+    assert bool(found(planted, "ur-passthrough", "passthrough-quantisation")) == broken
+
+
+PEAKS = {"position": (1.0, 0), "velocity": (15 / 8, 1), "acceleration": (10 / 3**0.5, 2), "jerk": (60.0, 3)}
+"""Of a quintic from rest to rest over a distance 1 in a time 1, and the order (Biagiotti, section 2.1)."""
+
+
+@SIDES
+@pytest.mark.parametrize("joint", [0, 6])
+@pytest.mark.parametrize("kind", PEAKS)
+def test_the_approach_keeps_each_limit_of_each_joint(kind: str, joint: int, side: float) -> None:
+    """From 0.2 rad beside the first point in half a second; the other direction has more of it."""
+    rows = motion(period=0.1, rows=21)
+    factor, order = PEAKS[kind]
+    later, stands = replace(rows, t=rows.t + 0.5), HOME[7].copy()
+    stands[joint] -= side * 0.2
+    peak = factor * 0.2 / 0.5**order + (0.0 if order else side * stands[joint])
+    for share, broken in ((-1e-6, True), (1e-6, False)):
+        bounds = [np.tile([-np.inf, np.inf], (7, 1)) for _ in range(4)]
+        bounds[order][joint] = [-9e3, peak + share] if side > 0 else [-peak - share, 9e3]
+        around = Surroundings(rows.joints, stands, Limits(*bounds))
+        every = judge_by_profile([later], load_profile("ros-jtc"), around).findings
+        over = [(each.kind, each.joint) for each in every if each.rule == "jtc-first-point"]
+        assert over == ([(kind, f"joint_{joint + 1}")] if broken else [])
+
+
+@SIDES
+def test_a_joint_that_rests_in_its_dead_zone_is_no_fault(side: float) -> None:
+    q = STILL.copy()
+    q[:, 0] = side * (2.7501 - 1e-3)
+    assert found(replace(FRANKA, q=q), "franka-fr3", "fr3-velocity-by-position") == []
+
+
+@SIDES
+def test_the_distance_from_either_end_is_told(side: float) -> None:
+    q = STILL.copy()
+    q[:, 0] = side * (2.7501 - 0.1)
+    q[10:, 0] += side * 1e-3
+    (one,) = found(replace(FRANKA, q=q), "franka-fr3", "fr3-velocity-by-position")
+    assert ", 0.1 rad before the end of its range" in one.message
+    allowed = np.sqrt(2 * 6 * 0.1) - 0.3 - 1e-3
+    assert [one.value, one.limit] == pytest.approx([side, side * allowed], rel=1e-6)
+    assert one.factor == pytest.approx(1 / allowed, rel=1e-6)
+
+
+def pushed(share: float, side: float, period: float = 1e-3) -> RecordedMotion:
+    q = STILL.copy()
+    q[:, 3] += side * share * (2.62 - 1e-3) * 1e-3 * np.arange(21)
+    return replace(FRANKA, t=period * np.arange(21), q=q)
+
+
+@SIDES
+@pytest.mark.parametrize(("beyond", "broken"), [(0.0, False), (3e-9, True)])
+def test_a_speed_just_at_its_limit_is_no_fault(beyond: float, broken: bool, side: float) -> None:
+    """Differences of positions near 2 rad are rounded by up to 4e-13 rad/s."""
+    over = found(pushed(1 + beyond, side), "franka-fr3", "fr3-velocity")
+    assert bool(over) == broken
+    assert all("decimals" not in each.message for each in over)
+
+
+@pytest.mark.parametrize(("period", "taken"), [(1.009e-3, True), (1.02e-3, False), (0.98e-3, False)])
+def test_rows_a_hundredth_beside_the_period_are_at_it(period: float, taken: bool) -> None:
+    assert bool(found(pushed(1.1, 1.0, period), "franka-fr3", "fr3-velocity")) == taken
+
+
+def test_rules_about_seven_joints_are_not_judged_for_six() -> None:
+    rows = replace(motion(6), tau=np.zeros((1001, 6)))
+    unjudged = dict(judged(rows, "franka-fer").unjudged)
+    profile = load_profile("franka-fer")
+    of_seven = [
+        rule.id for rule in profile.rules if any(np.size(each) == 7 for each in rule.parameters.values())
+    ]
+    assert len(of_seven) > 5
+    assert {name: unjudged.get(name) for name in of_seven} == dict.fromkeys(
+        of_seven, "it is about 7 joints, and there are 6"
+    )
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("profile", ["franka-fr3", "ros-jtc", "ur-servoj", "ur-passthrough"])
+def test_a_few_rows_at_rest_are_at_rest(profile: str, count: int) -> None:
+    joints = 6 if profile.startswith("ur") else 7
+    period = {"franka-fr3": 1e-3, "ur-servoj": 2e-3}.get(profile, 0.1)
+    rows = motion(joints, period, max(count, 2), columns="q")
+    rows = replace(rows, t=rows.t[:count], q=np.tile(HOME[joints], (count, 1)))
+    around = Surroundings(rows.joints, HOME[joints])
+    assert judge_by_profile([rows], load_profile(profile), around).findings == ()
+
+
+@pytest.mark.parametrize("row", [5, 6, 7, 8])
+def test_the_largest_step_of_velocity_has_its_row_in_blocks_too(row: int) -> None:
+    """Straight lines: slow until a row, five times as fast behind it, and slow to the end."""
+    rows = motion(period=0.1, rows=21, columns="q")
+    speed = np.where(np.arange(20) < row, 0.02, 0.1) - 0.004 * np.maximum(np.arange(20) - row, 0)
+    q = np.tile(HOME[7], (21, 1))
+    q[1:, 4] += np.cumsum(0.1 * speed)
+    (one,) = judged(replace(rows, q=q), "ros-jtc").findings
+    assert (one.joint, one.row) == ("joint_5", row + 1)
+    assert one.value == pytest.approx(0.08)

@@ -1,0 +1,256 @@
+"""What two columns may differ by, source by source: each alone, on both sides of its line, in either direction.
+
+All motions are so simple that what a source explains is one product: rows at rest, or at one speed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recorded_rows import bare_robot
+
+from trajcli.findings import Finding
+from trajcli.judge.consistency import Changes
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.kinematics.robot import Limits, unlimited
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+
+COUNT = 24
+DENSE = np.cumsum(0.004 + 0.001 * (np.arange(COUNT) % 3))  # s; no multiples of a period
+OFF = 1e-5
+SIDES = pytest.mark.parametrize("side", [1, -1])
+
+
+def rows(*columns: np.ndarray, t: np.ndarray = DENSE, late: float = 0.0, **off: float) -> RecordedMotion:
+    """Return rows of one joint, or of several, with the roundings of their columns."""
+    stated = [each[:, None] if each.ndim == 1 else each for each in columns]
+    roundings = [np.full(stated[0].shape[1], off.get(name, 0.0)) for name in ("q", "qd", "qdd")]
+    every = [*stated, None, None][:3]
+    return RecordedMotion(t, *every, None, None, None, None, Resolution(late, *roundings), "rows")
+
+
+def inconsistent(motion: RecordedMotion, limits: Limits | None = None) -> list[Finding]:
+    """Return the jumps, and the columns that are no derivatives."""
+    robot = bare_robot(limits or unlimited(motion.q.shape[1]))
+    judgement = judge_motion(lambda: [motion], Requirements(robot))
+    return [each for each in judgement.findings if each.rule in ("continuity", "derivative")]
+
+
+@SIDES
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])
+def test_both_values_of_a_change_may_be_rounded(share: float, broken: bool, order: int, side: int) -> None:
+    """The rate is zero throughout; the values are off in turns, up and down."""
+    still = np.zeros(COUNT)
+    off = side * share * OFF * (-1.0) ** np.arange(COUNT)
+    columns = [off, still] if order == 0 else [np.zeros(COUNT), off, still]
+    motion = rows(*columns, **{("q", "qd")[order]: OFF})
+    found = [each for each in inconsistent(motion) if each.quantity == ("velocity", "acceleration")[order]]
+    assert [each.kind for each in found] == (["derivative"] if broken else [])
+
+
+@SIDES
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])
+def test_both_rates_of_an_interval_may_be_rounded(share: float, broken: bool, order: int, side: int) -> None:
+    """Values that do not change, and a rate that is one number throughout."""
+    still, rate = np.zeros(COUNT), np.full(COUNT, side * share * OFF)
+    columns = [still, rate] if order == 0 else [still, still, rate]
+    motion = rows(*columns, **{("qd", "qdd")[order]: OFF})
+    (found,) = inconsistent(motion) or [None]
+    assert (found is not None) == broken
+    if found is not None:
+        assert (found.kind, found.severity) == ("derivative", "error")
+        assert found.value == pytest.approx(side * share * OFF, rel=1e-6)
+        assert found.limit == pytest.approx(0.0, abs=1e-12)
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])
+def test_both_stamps_of_an_interval_may_be_rounded(share: float, broken: bool, side: int) -> None:
+    late, speed = 1e-4, np.full(COUNT, side * 1.0)
+    true = DENSE + share * late * (-1.0) ** np.arange(COUNT)
+    found = inconsistent(rows(side * true, speed, late=late))
+    assert [each.kind for each in found] == (["derivative"] if broken else [])
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.9e-3, False), (1.4e-3, True), (5e-3, True)])
+def test_a_column_that_differs_by_a_thousandth_of_its_peak_is_meant(
+    share: float, broken: bool, side: int
+) -> None:
+    found = inconsistent(rows(side * DENSE, np.full(COUNT, side * (1 + share))))
+    assert [each.kind for each in found] == (["derivative"] if broken else [])
+
+
+@SIDES
+@pytest.mark.parametrize("quick", [0, 1])
+@pytest.mark.parametrize(("share", "broken"), [(0.8e-4, False), (1.5e-4, True)])
+def test_beside_a_quick_joint_a_slow_one_may_differ_by_a_ten_thousandth(
+    share: float, broken: bool, quick: int, side: int
+) -> None:
+    q, qd = np.zeros((COUNT, 2)), np.zeros((COUNT, 2))
+    q[:, quick], qd[:, quick] = DENSE, 1.0
+    qd[:, 1 - quick] = side * share
+    found = inconsistent(rows(q, qd))
+    assert [each.joint for each in found] == ([f"j{2 - quick}"] if broken else [])
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.99, False), (1.02, True)])
+def test_between_distant_rows_a_joint_may_do_all_that_its_limits_allow(
+    share: float, broken: bool, side: int
+) -> None:
+    """From rest to rest within T it goes a T^2 / 4 far; with no acceleration at its ends j T^2 / 4 faster."""
+    t, length, still = 0.5 * np.arange(12.0), 0.5, np.zeros(12)
+    step = np.where(np.arange(12) > 2, 1.0, 0.0)
+    limits = replace(unlimited(1), acceleration=np.array([[-1.0, 2.0]]))
+    far = side * share * 2.0 * length**2 / 4
+    assert bool(inconsistent(rows(far * step, still, t=t), limits)) == broken
+    limits = replace(unlimited(1), jerk=np.array([[-3.0, 1.0]]), acceleration=np.array([[-9.0, 9.0]]))
+    gain = side * share * 3.0 * length**2 / 4
+    speed = gain * (np.arange(12) % 2)
+    moved = np.append(0.0, np.cumsum(np.full(11, gain / 2 * length)))
+    assert [each.quantity for each in inconsistent(rows(moved, speed, still, t=t), limits)] == (
+        ["acceleration"] if broken else []
+    )
+
+
+@pytest.mark.parametrize(
+    ("first", "wrong", "persistent"),
+    [(0, 16, False), (0, 17, True), (183, 17, True), (184, 16, False), (100, 32, False), (100, 33, True)],
+)
+def test_a_column_is_wrong_where_most_of_the_intervals_around_are(
+    first: int, wrong: int, persistent: bool
+) -> None:
+    """Around an inner interval are 65 of them, 32 on each side; at an end there are 33."""
+    change, none = np.ones((200, 1)), np.zeros((200, 1))
+    disagree = np.zeros((200, 1), dtype=bool)
+    disagree[first : first + wrong] = True
+    of_velocity = Changes(1, change, none, change, none)
+    assert of_velocity.persistent(disagree).any() == persistent
+    assert not (of_velocity.persistent(disagree) & ~disagree).any()
+    of_position = Changes(0, change, none, change, none)
+    assert (of_position.persistent(disagree) == disagree).all()
+
+
+def test_intervals_at_rest_do_not_count_and_few_do_not_judge() -> None:
+    """Four of four that move are too few, five are most of eight; the others are still, up to rounding."""
+    none, error = np.zeros((200, 1)), np.full((200, 1), 1e-3)
+    for wrong in (4, 5):
+        disagree = np.zeros((200, 1), dtype=bool)
+        disagree[100 : 100 + wrong] = True
+        change = np.where(disagree, 1.0, 0.4e-3)
+        found = Changes(1, change, error, change, none).persistent(disagree)
+        assert found.any() == (wrong == 5)
+
+
+@SIDES
+@pytest.mark.parametrize(("times", "jumps"), [(3.5, False), (4.5, True), (30.0, True)])
+@pytest.mark.parametrize("at", [0, 1, 11, COUNT - 2])
+@pytest.mark.parametrize("beside", [0.0, 9.0])
+def test_a_jump_is_four_times_the_changes_beside_it(
+    beside: float, at: int, times: float, jumps: bool, side: int
+) -> None:
+    """Of positions alone, over the limit of velocity; another joint may have none, and may move faster."""
+    steps = np.full(COUNT - 1, 1e-3)
+    steps[at] *= times
+    q = np.zeros((COUNT, 2))
+    q[1:, 0], q[:, 1] = side * np.cumsum(steps), beside * DENSE
+    velocity = np.array([[-0.3, 0.5], [-np.inf, np.inf]] if side > 0 else [[-0.5, 0.3], [-np.inf, np.inf]])
+    found = inconsistent(rows(q), replace(unlimited(2), velocity=velocity))
+    assert [(each.kind, each.joint, each.row) for each in found] == (
+        [("jump", "j1", at + 1)] if jumps else []
+    )
+    if jumps:
+        assert found[0].value == pytest.approx(side * times * 1e-3)
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.2, True)])
+def test_a_jump_may_last_longer_than_its_stamps_say(share: float, broken: bool, side: int) -> None:
+    """Two stamps may be off; the other direction may be slower, or not at all."""
+    late, q = 1e-4, np.zeros(COUNT)
+    length = DENSE[12] - DENSE[11]
+    q[12:] = side * 2.0 * (length + share * 2 * late)
+    velocity = np.array([[-1.0, 2.0] if side > 0 else [-2.0, 1.0]])
+    found = inconsistent(rows(q, late=late), replace(unlimited(1), velocity=velocity))
+    assert [each.kind for each in found] == (["jump"] if broken else [])
+
+
+@SIDES
+def test_rates_of_a_joint_that_rests_are_no_jump_of_its_position(side: int) -> None:
+    qd = np.zeros(COUNT)
+    qd[8:18] = side * 0.5
+    (found,) = inconsistent(rows(np.zeros(COUNT), qd))
+    assert (found.kind, found.quantity, found.value) == ("derivative", "velocity", side * 0.5)
+
+
+@SIDES
+def test_the_column_that_jumps_is_named(side: int) -> None:
+    """A joint at 1 rad/s, whose velocities have a block of zeros: positions go on as before."""
+    qd = np.full(COUNT, side * 1.0)
+    qd[8:18] = 0.0
+    assert {each.kind for each in inconsistent(rows(side * DENSE, qd))} == {"derivative"}
+    q = side * np.where(np.arange(COUNT) < 12, DENSE, DENSE + 0.1)  # and where it is the position
+    found = inconsistent(rows(q, np.full(COUNT, side * 1.0)))
+    assert [(each.kind, each.quantity, each.row) for each in found] == [("jump", "position", 12)]
+
+
+@pytest.mark.parametrize("length", [0.5, 10.0])
+def test_a_distant_row_beside_near_ones_may_be_reached_by_all_that_limits_allow(length: float) -> None:
+    """Also where a move takes so long that it gets further than with the largest step of acceleration."""
+    t = np.append(DENSE, DENSE[-1] + length * np.arange(1, 4))
+    far = 0.99 * 2.0 * length**2 / 4
+    q, still = np.where(t > DENSE[-1], far, 0.0), np.zeros(t.size)
+    limits = replace(unlimited(1), acceleration=np.array([[-1.0, 2.0]]))
+    assert inconsistent(rows(q, still, t=t), limits) == []
+
+
+@SIDES
+def test_between_distant_rows_an_acceleration_may_be_another_one(side: int) -> None:
+    """Rows state the one limit throughout, and between them it is the other one."""
+    t, length = 0.5 * np.arange(12.0), 0.5
+    qd = side * 2.0 * t
+    q = np.append(0.0, np.cumsum(length * (qd[1:] + qd[:-1]) / 2))
+    limits = replace(unlimited(1), acceleration=np.array([[-1.0, 2.0] if side > 0 else [-2.0, 1.0]]))
+    found = inconsistent(rows(q, qd, np.full(12, -side * 1.0), t=t), limits)
+    assert [each for each in found if each.quantity == "acceleration"] == []
+
+
+@SIDES
+def test_accelerations_that_switch_between_rows_are_no_wrong_column(side: int) -> None:
+    """One and minus one in turns, as long as the rows say or twice as long."""
+    qdd = side * (-1.0) ** np.arange(COUNT)
+    gains = 0.9 * qdd[:-1] * np.diff(DENSE)
+    qd = np.append(0.0, np.cumsum(gains))
+    q = np.append(0.0, np.cumsum(np.diff(DENSE) * (qd[1:] + qd[:-1]) / 2))
+    wide = replace(unlimited(1), acceleration=np.array([[-2.0, 2.0]]))
+    assert inconsistent(rows(q, qd, qdd), wide) == []
+
+
+@pytest.mark.parametrize("stated", [0.0, 1.0, -1.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_all_that_moves_or_is_said_to_move_is_counted(side: float, stated: float) -> None:
+    """Eleven intervals of thirty that move are too few; an interval that agrees is none of the wrong ones."""
+    none, disagree = np.zeros((30, 1)), np.zeros((30, 1), dtype=bool)
+    disagree[:11] = True
+    moved, said = np.full((30, 1), side * (stated == 0)), np.full((30, 1), side * stated)
+    for change, of_column in ((moved, said), (said, moved)):
+        assert not Changes(1, change, none, of_column, none).persistent(disagree).any()
+        every = np.ones((30, 1), dtype=bool)
+        every[17] = False
+        assert (Changes(1, change, none, of_column, none).persistent(every) == every).all()
+
+
+@SIDES
+@pytest.mark.parametrize("at", [0, 11, COUNT - 3])
+def test_of_two_large_changes_side_by_side_the_larger_one_is_the_jump(at: int, side: int) -> None:
+    steps = np.full(COUNT - 1, 1e-3)
+    steps[at : at + 2] *= 10.0, 8.0
+    q = np.append(0.0, side * np.cumsum(steps))
+    velocity = np.array([[-0.3, 0.3]])
+    (found,) = inconsistent(rows(q), replace(unlimited(1), velocity=velocity))
+    assert (found.kind, found.row, found.count) == ("jump", at + 1, 1)
