@@ -51,6 +51,16 @@ def test_degrees_for_radians_are_hinted_at() -> None:
     assert judgement.findings[0].kind == "position"
 
 
+@pytest.mark.parametrize(("times", "looks"), [(57.3, True), (1.0, False)])
+def test_degrees_of_joints_without_ranges_are_hinted_at_once(times: float, looks: bool) -> None:
+    """Where no range is passed velocities tell; turns that are a little too fast are none."""
+    share = np.linspace(0.0, 1.0, 201)
+    q = times * np.outer(10 * share**3 - 15 * share**4 + 6 * share**5, [15.0, 14.0])  # rad, in 2 s
+    found = trajcli.check(2.0 * share, q, limits={"velocity": 0.9 * 15 * 1.875 / 2.0})
+    assert found.verdict == "exceeded"
+    assert sum("degrees" in (each.hint or "") for each in found.findings) == looks
+
+
 def test_a_doubled_time_is_a_finding() -> None:
     times = T.copy()
     times[20] = times[19]

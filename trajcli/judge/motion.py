@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,7 @@ _EXACT = 4.0  # units in the last place of a length between exact stamps
 _SEEN = 1e-9  # of the period: stamps that are moved by less are as they were
 _MOST = 9  # intervals of one period for each longer one: then a longer one is a hole
 _STANDS = 1.0  # s: any length will do
+_FAR_OVER = 3.0  # times a limit of a rate: degrees are 57 times as large as radians
 _TURNS = 4.0 * np.pi  # rad: no joint goes there, and degrees read as radians do
 
 
@@ -131,6 +132,8 @@ class MotionJudge:
         self._requirements, self._snap, self._worst = requirements, snap, Collector()
         robot = requirements.robot
         self._axes = robot
+        self._revolute = [kind == "revolute" for kind in robot.joint_types]
+        self._farthest = 0.0
         self._holes, self._regular = Collector(), 0
         self._stamps: Stamps | None = None
         self._interpolation: Interpolation = "linear"
@@ -168,6 +171,8 @@ class MotionJudge:
         if not rows.t.size:
             return
         self._kept = rows if self._kept is None else self._kept.followed_by(rows)
+        of_angles = np.asarray(rows.states[0])[:, self._revolute]
+        self._farthest = max(self._farthest, float(np.abs(of_angles).max(initial=0.0)))
         if self._first_state is None:
             self._first_state = rows.part(slice(0, 1))
 
@@ -199,10 +204,8 @@ class MotionJudge:
             of_consumer, unjudged = self._consumer.result()
             findings, notes = [*findings, *of_consumer], [*notes, *unjudged]
         period = stamps.lattice.period if stamps.lattice is not None and stamps.regular else None
-        hinted = [_with_hint(finding, self._axes) for finding in _causes(findings)]
-        return Judgement(
-            worst_first(hinted), self._interpolation, self._count, period, self._source, tuple(notes)
-        )
+        hinted = _with_unit_hint(worst_first(_causes(findings)), self._axes, self._farthest)
+        return Judgement(tuple(hinted), self._interpolation, self._count, period, self._source, tuple(notes))
 
     def _begin(self, block: RecordedMotion) -> None:
         """Decide what the first rows decide for all: how they are joined, and the period."""
@@ -382,12 +385,28 @@ def _causes(findings: list[Finding]) -> list[Finding]:
     ]
 
 
-def _with_hint(finding: Finding, axes: NamedJoints) -> Finding:
-    """Return the finding with what would mend it, where that is known."""
-    if finding.hint is not None or finding.joint is None or finding.value is None:
-        return finding
-    turning = axes.joint_types[axes.joint_names.index(finding.joint)] == "revolute"
-    if finding.kind == "position" and turning and abs(finding.value) > _TURNS:
-        size = f"{abs(finding.value):.6g}"
-        return replace(finding, hint=f"values up to {size}: degrees? then say --units deg")
-    return finding
+def _with_unit_hint(findings: Sequence[Finding], axes: NamedJoints, farthest: float) -> list[Finding]:
+    """Return findings, the first of which says that the file may be in degrees where its values look like it.
+
+    Args:
+        findings: The worst first.
+        axes: The joints.
+        farthest: The largest value of a revolute joint, rad.
+    """
+    found = list(findings)
+    if farthest <= _TURNS:
+        return found
+    revolute = {
+        name for name, kind in zip(axes.joint_names, axes.joint_types, strict=True) if kind == "revolute"
+    }
+    of_joints = [
+        k
+        for k, f in enumerate(found)
+        if f.joint in revolute and (f.kind == "position" or (f.kind in QUANTITIES and f.excess > _FAR_OVER))
+    ]
+    if of_joints:
+        at = min(of_joints, key=lambda k: found[k].kind != "position")
+        if found[at].hint is None:
+            hint = f"values up to {farthest:.6g}: degrees? then say --units deg"
+            found[at] = replace(found[at], hint=hint)
+    return found
