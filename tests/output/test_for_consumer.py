@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,13 @@ from trajcli.curves.operations import scale_time
 from trajcli.grids import UniformGrid
 from trajcli.job.read import load_job
 from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
+from trajcli.output.delivery.joined_rows import JoinedRows
+from trajcli.output.delivery.stretched_moves import StretchedMoves
+from trajcli.output.write import grid_of
+from trajcli.planners.planner import PlannedMove
 from trajcli.planners.point_to_point.whole_periods import PhasesInPeriods, profile_in_periods
+from trajcli.planning.adaptation import Adaptation
+from trajcli.planning.plan import plan_job
 from trajcli.streams.formats import FORMATS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -94,6 +101,24 @@ def test_no_smaller_uniform_stretch_does_it(name: str) -> None:
         )
         grid = UniformGrid(longer, rate)
         assert largest_share(slower, grid, 1e-4) > 1 + WITHIN
+
+
+def test_moves_that_are_said_to_be_over_a_limit_between_rows_are() -> None:
+    """By scipy's curves through the rows of the whole motion; one that is slow enough is not said to be over."""
+    loaded = load_job(str(EXAMPLES / "time_optimal.yaml"), ("when_over_limit=slow", "output.align=true"))
+    known: dict[Any, PlannedMove] = {}
+    plan = plan_job(loaded, adapted=Adaptation(known=known))
+    rate = loaded.job.output.rate
+    rows = JoinedRows(plan, grid_of(plan), ("t", "q", "qd", "qdd"), exact=True)
+    moves = StretchedMoves(rows, rate, known)
+    said = 0
+    for factor in few((1.0, 1.02, 1.05, 1.1, 1.2, 1.3), 3):
+        slower = plan_job(loaded, adapted=Adaptation(stretches=dict.fromkeys(range(3), factor), known=known))
+        if moves.are_over(factor):
+            assert largest_share(slower, grid_of(slower), 1e-4) > 1 + WITHIN
+            said += 1
+    assert said >= 2
+    assert not any(map(moves.are_over, (1.3, 1.6)))
 
 
 def test_python_and_batch_plan_for_a_consumer(tmp_path: Path) -> None:

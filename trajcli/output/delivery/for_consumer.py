@@ -327,11 +327,16 @@ class _Search:
         """Return the motion stretched as a whole by the fewest periods that do, where that beats the best."""
         if not isinstance(first.grid, UniformGrid) or self._writing.form.content == "knots":
             return None
+        from trajcli.output.delivery.stretched_moves import StretchedMoves
+
         duration, rate = first.plan.trajectory.duration, first.grid.rate
+        by_move = StretchedMoves(first.rows, rate, self._known)
         longest = np.inf if best is None else best.plan.trajectory.duration
         most = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
         for periods in range(1, most):
             factor = 1 + periods / (rate * duration)
+            if by_move.are_over(factor):
+                continue
             stretches = {move.index: factor for move in first.plan.moves}
             report_progress(f"planning for {self._profile.name}, {periods} periods longer")
             with suppress(TrajcliError):

@@ -1,0 +1,95 @@
+"""Moves stretched alike, each judged by itself: which of them are over a limit between the rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from trajcli.curves.piecewise import derivative_coefficients, horner
+from trajcli.errors import TrajcliError
+from trajcli.judge.reconstruction import piece_coefficients
+from trajcli.output.delivery.joined_rows import JoinedRows
+from trajcli.planners.planner import PlannedMove
+from trajcli.planning.adaptation import Adaptation
+from trajcli.planning.retime import align_to_period
+
+_STATED = {"linear": 1, "cubic": 2, "quintic": 3}  # of position, velocity and acceleration
+_PLACES = np.linspace(0.0, 1.0, 9)  # of an interval, where its curve is looked at
+_ON_ROW = 1e-6  # of a period
+_CERTAIN = 3e-6  # relative: above a limit by more than counts as over
+_NOISE = 120.0  # last bits of a position at both ends of an interval h: 60 / h^3 times as much, of a quintic
+
+
+class StretchedMoves:
+    """Moves from rest to rest that begin and end on rows, for any factor by which all are stretched.
+
+    What joins the rows inside such a move depends on its duration alone, so that each is judged once; and one
+    that is over a limit is enough for a motion that need not be planned.
+    """
+
+    def __init__(self, rows: JoinedRows, rate: float, known: Mapping[Any, PlannedMove]) -> None:
+        """Take the moves as they are planned before anything is known of their rows.
+
+        Args:
+            rows: Of the motion that is not stretched.
+            rate: Of the rows, 1/s.
+            known: Its moves by `Adaptation.key`.
+        """
+        plan, first = rows.plan, Adaptation()
+        moves = [known.get(first.key(move.index, move.start)) for move in plan.moves if move.duration > 0]
+        fit = not plan.loaded.job.names_zones and rows.interpolation is not None
+        self._moves = [
+            move
+            for move in moves
+            if fit and move is not None and move.at_rest and not move.robot.limits.has_effort
+        ]
+        self._rate, self._interpolation = rate, rows.interpolation
+        self._over: dict[tuple[int, int], bool] = {}
+
+    def are_over(self, factor: float) -> bool:
+        """Return whether a move is certainly over a limit of a joint when all of them are so much longer."""
+        adapted = Adaptation(stretches={move.index: factor for move in self._moves})
+        for move in self._moves:
+            try:
+                longer = align_to_period(
+                    adapted.stretched(move) if move.over_limit == "slow" else move, self._rate
+                )
+            except TrajcliError:
+                return False
+            key = move.index, round(longer.duration * self._rate)
+            if key not in self._over:
+                self._over[key] = self._is_over(longer)
+            if self._over[key]:
+                return True
+        return False
+
+    def _is_over(self, move: PlannedMove) -> bool:
+        """Return whether the curve that joins rows is over a limit where a break of the planned one lies."""
+        curve, period = move.planned.curve, 1.0 / self._rate
+        assert self._interpolation is not None  # noqa: S101
+        stated = _STATED[self._interpolation]
+        places = curve.breaks * self._rate
+        inside = np.unique(np.floor(places[np.abs(places - np.rint(places)) > _ON_ROW]))
+        inside = inside[(inside + 1) * period <= curve.end]
+        if not inside.size:
+            return False
+        before = curve.evaluate_orders(inside * period, range(stated))
+        after = curve.evaluate_orders((inside + 1) * period, range(stated), side="left")
+        both = np.stack([before, after], axis=1).reshape(2 * inside.size, stated, -1)
+        lengths = np.full(2 * inside.size - 1, period)
+        columns = [both[:, order] if order < stated else None for order in range(3)]
+        pieces = piece_coefficients(lengths, both[:, 0], columns[1], columns[2], self._interpolation)[:, ::2]
+        last_bits = _NOISE * float(np.spacing(np.abs(both[:, 0]).max()))
+        for order in range(1, stated + 1):
+            values = horner(
+                derivative_coefficients(pieces, order)[:, None], period * _PLACES[:, None, None]
+            ).reshape(-1, both.shape[2])
+            bounds = move.robot.limits.of_order(order)
+            slack = last_bits / period**order
+            low = (values.min(axis=0) + slack) / bounds[:, 0]
+            high = (values.max(axis=0) - slack) / bounds[:, 1]
+            if max(float(low.max()), float(high.max())) > 1 + _CERTAIN:
+                return True
+        return False
