@@ -16,7 +16,7 @@ from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.retime import align_to_period
 
 _STATED = {"linear": 1, "cubic": 2, "quintic": 3}  # of position, velocity and acceleration
-_PLACES = np.linspace(0.0, 1.0, 9)  # of an interval, where its curve is looked at
+_SHARES = np.linspace(0.0, 1.0, 9)  # of an interval, at which its curve is looked at
 _ON_ROW = 1e-6  # of a period
 _CERTAIN = 3e-6  # relative: above a limit by more than counts as over
 _NOISE = 120.0  # last bits of a position at both ends of an interval h: 60 / h^3 times as much, of a quintic
@@ -70,8 +70,8 @@ class StretchedMoves:
         curve, period = move.planned.curve, 1.0 / self._rate
         assert self._interpolation is not None  # noqa: S101
         stated = _STATED[self._interpolation]
-        places = curve.breaks * self._rate
-        inside = np.unique(np.floor(places[np.abs(places - np.rint(places)) > _ON_ROW]))
+        in_periods = curve.breaks * self._rate
+        inside = np.unique(np.floor(in_periods[np.abs(in_periods - np.rint(in_periods)) > _ON_ROW]))
         inside = inside[(inside + 1) * period <= curve.end]
         if not inside.size:
             return False
@@ -84,7 +84,7 @@ class StretchedMoves:
         last_bits = _NOISE * float(np.spacing(np.abs(both[:, 0]).max()))
         for order in range(1, stated + 1):
             values = horner(
-                derivative_coefficients(pieces, order)[:, None], period * _PLACES[:, None, None]
+                derivative_coefficients(pieces, order)[:, None], period * _SHARES[:, None, None]
             ).reshape(-1, both.shape[2])
             bounds = move.robot.limits.of_order(order)
             slack = last_bits / period**order
