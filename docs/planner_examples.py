@@ -165,7 +165,8 @@ leaves out is found. The last point's are zero unless given. Points that repeat 
 the minimum duration of what lay between goes to the next segment, or where there is none to the one before.
 
 The search is deterministic: `starts` of these starting points are tried, in this order, and each is
-improved until nothing is gained. (1) Knots that are free, eight in each segment, from six tenths of the
+improved until nothing is gained, or left where it nears the best too slowly. (1) Knots that are free,
+eight in each segment, from six tenths of the
 times of stopping at each point; (2) the straight motion of each collinear stretch; (3) twelve free knots,
 from eight tenths of those times; (4) central differences of the points, at the best of six speeds; (5) six
 free knots, from the times at the velocity limits; (6) eight, from the times of the best motion so far; (7)

@@ -1,9 +1,8 @@
 """Linear programmes over the segments of a list of points, by an interior-point method.
 
-The unknowns are those of each segment and joint (w), those of each joint at each inner point (x), and those
-that all joints of a segment share (s). A row sees one segment and one joint: its own w, x at both ends, and
-s. Eliminating w, then s, leaves a system for x that is block-tridiagonal by points, so that a step costs
-time in proportion to the number of segments.
+The unknowns are those of each joint at each inner point (x), and those that all joints of a segment share
+(s). A row sees one segment and one joint: x at both ends, and s. Eliminating s leaves a system for x that is
+block-tridiagonal by points, so that a step costs time in proportion to the number of segments.
 
 Source: Mehrotra, On the Implementation of a Primal-Dual Interior Point Method, SIAM J. Optimization 2 (1992);
 Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 14.
@@ -30,11 +29,11 @@ _STIFF = 1e14  # a larger ratio of multiplier and slack changes nothing
 
 @frozen
 class SegmentProgramme:
-    """Minimise cost @ s + weight |y|^2 / 2 over y = (w, x, s) with low <= rows y <= high and s within bounds.
+    """Minimise cost @ s + weight |y|^2 / 2 over y = (x, s) with low <= rows y <= high and s within bounds.
 
     Attributes:
-        rows: Shape (K, n, R, q + 4 + m): columns for w, x at the point before and after, s. Columns of x that
-            is fixed, as at both ends, are zero.
+        rows: Shape (K, n, R, 4 + m): columns for x at the point before and after, s. Columns of x that is
+            fixed, as at both ends, are zero.
         low: Shape (K, n, R), finite.
         high: Shape (K, n, R), finite.
         cost: Shape (K, m).
@@ -51,26 +50,17 @@ class SegmentProgramme:
     upper_bound: Array
     weight: float = 1e-6
 
-    @property
-    def own(self) -> int:
-        """How many unknowns w each segment and joint has."""
-        return int(self.rows.shape[3] - 2 * _ENDS - self.cost.shape[1])
-
-    def split(self, y: Array) -> tuple[Array, Array, Array]:
-        """Return w (K, n, q), x (K + 1, n, 2) and s (K, m)."""
+    def split(self, y: Array) -> tuple[Array, Array]:
+        """Return x (K + 1, n, 2) and s (K, m)."""
         segments, joints = self.rows.shape[:2]
-        first, last = segments * joints * self.own, y.size - self.cost.size
-        return (
-            y[:first].reshape(segments, joints, self.own),
-            y[first:last].reshape(segments + 1, joints, _ENDS),
-            y[last:].reshape(self.cost.shape),
-        )
+        last = y.size - self.cost.size
+        return y[:last].reshape(segments + 1, joints, _ENDS), y[last:].reshape(self.cost.shape)
 
     @property
     def size(self) -> int:
         """How many unknowns there are, those at both ends counted."""
         segments, joints = self.rows.shape[:2]
-        return int(segments * joints * self.own + (segments + 1) * joints * _ENDS + self.cost.size)
+        return int((segments + 1) * joints * _ENDS + self.cost.size)
 
     @cached_property
     def whole(self) -> Array | None:
@@ -79,7 +69,7 @@ class SegmentProgramme:
         Of some fifty unknowns the products of one matrix take less time than those of its blocks.
         """
         segments, joints, count = self.low.shape
-        if self.own or self.size > _WHOLE:
+        if self.size > _WHOLE:
             return None
         ends = np.zeros((segments, joints, count, segments + 1, joints, _ENDS))
         shared = np.zeros((segments, joints, count, *self.cost.shape))
@@ -95,7 +85,7 @@ class SegmentProgramme:
         return np.concatenate([above, below])
 
     def inner(self, y: Array) -> Array:
-        """Return x at inner points, and s, of unknowns y without w."""
+        """Return x at inner points, and s, of unknowns y."""
         ends = self.rows.shape[1] * _ENDS
         return np.concatenate([y[ends : -ends - self.cost.size], y[-self.cost.size :]])
 
@@ -108,10 +98,10 @@ class SegmentProgramme:
         """Return the rows times y, then s, as one vector."""
         if self.whole is not None:
             return self.whole @ self.inner(y)
-        w, x, s = self.split(y)
+        x, s = self.split(y)
         segments, joints = self.rows.shape[:2]
         shared = np.broadcast_to(s[:, None], (segments, joints, s.shape[1]))
-        local = np.concatenate([w, x[:-1], x[1:], shared], axis=2)
+        local = np.concatenate([x[:-1], x[1:], shared], axis=2)
         return np.concatenate([(self.rows @ local[..., None])[..., 0].ravel(), s.ravel()])
 
     def adjoint(self, z: Array) -> Array:
@@ -120,13 +110,11 @@ class SegmentProgramme:
             return self.with_ends(z @ self.whole)
         at, count = self.cost.size, self.low.size
         local = (z[:count].reshape(self.low.shape)[..., None, :] @ self.rows)[..., 0, :]
-        q = self.own
         y = np.zeros(self.size)
-        w, x, s = self.split(y)
-        w += local[..., :q]
-        x[:-1] += local[..., q : q + _ENDS]
-        x[1:] += local[..., q + _ENDS : q + 2 * _ENDS]
-        s += local[..., q + 2 * _ENDS :].sum(axis=1) + z[count : count + at].reshape(s.shape)
+        x, s = self.split(y)
+        x[:-1] += local[..., :_ENDS]
+        x[1:] += local[..., _ENDS : 2 * _ENDS]
+        s += local[..., 2 * _ENDS :].sum(axis=1) + z[count : count + at].reshape(s.shape)
         return y
 
 
@@ -149,17 +137,12 @@ class _Newton:
     """The matrix weight I + rows' D rows, factored."""
 
     def __init__(self, programme: SegmentProgramme, scale: Array) -> None:
-        rows, weight, q = programme.rows, programme.weight, programme.own
+        rows, weight = programme.rows, programme.weight
         segments, joints = rows.shape[:2]
-        self._programme, self._sizes = programme, (segments, joints, q)
+        self._programme, self._sizes = programme, (segments, joints)
         local = scale[: programme.low.size].reshape(programme.low.shape)
         matrix = rows.swapaxes(2, 3) @ (rows * local[..., None])
         inner = 2 * _ENDS
-        if q:
-            matrix[:, :, range(q), range(q)] += weight
-            self._w_inverse = np.linalg.inv(matrix[:, :, :q, :q])
-            self._w_gain = self._w_inverse @ matrix[:, :, :q, q:]
-            matrix = matrix[:, :, q:, q:] - matrix[:, :, q:, :q] @ self._w_gain
         shared = matrix[:, :, inner:, inner:].sum(axis=1)
         m = shared.shape[1]
         shared[:, range(m), range(m)] += weight + scale[programme.low.size :].reshape(segments, m)
@@ -170,7 +153,7 @@ class _Newton:
 
     def _factor(self, ends: Array) -> None:
         """Assemble and factor the block-tridiagonal matrix of x at the inner points."""
-        segments, joints, _ = self._sizes
+        segments, joints = self._sizes
         size = joints * _ENDS
         blocks = np.zeros((segments, joints, 2 * _ENDS, joints, 2 * _ENDS))
         blocks[:, range(joints), :, range(joints), :] = ends.swapaxes(0, 1)
@@ -193,26 +176,16 @@ class _Newton:
     def solve(self, right: Array) -> Array:
         """Return the solution for a right side."""
         programme = self._programme
-        segments, joints, q = self._sizes
-        w, x, s = programme.split(right)
-        ends = np.zeros((segments, joints, 2 * _ENDS))
-        if q:
-            moved = (self._w_gain.swapaxes(2, 3) @ w[..., None])[..., 0]
-            ends -= moved[..., : 2 * _ENDS]
-            s = s - moved[..., 2 * _ENDS :].sum(axis=1)
-        ends -= (self._s_gain @ s[..., None]).reshape(ends.shape)
+        segments, joints = self._sizes
+        x, s = programme.split(right)
+        ends = -(self._s_gain @ s[..., None]).reshape(segments, joints, 2 * _ENDS)
         unknowns = (x[1:-1] + ends[:-1, :, _ENDS:] + ends[1:, :, :_ENDS]).reshape(segments - 1, -1)
-        answer = np.zeros(programme.size)
-        w_answer, x_answer, s_answer = programme.split(answer)
-        x_answer[1:-1] = self._points(unknowns).reshape(segments - 1, joints, _ENDS)
+        inner = self._points(unknowns).reshape(segments - 1, joints, _ENDS)
+        x_answer = np.pad(inner, ((1, 1), (0, 0), (0, 0)))
         both = np.concatenate([x_answer[:-1], x_answer[1:]], axis=2)
         along = (both.reshape(segments, 1, -1) @ self._coupling)[:, 0]
-        s_answer += (self._s_inverse @ (s - along)[..., None])[..., 0]
-        if q:
-            shared = np.broadcast_to(s_answer[:, None], (segments, joints, s_answer.shape[1]))
-            others = np.concatenate([both, shared], axis=2)
-            w_answer[...] = (self._w_inverse @ w[..., None] - self._w_gain @ others[..., None])[..., 0]
-        return answer
+        s_answer = (self._s_inverse @ (s - along)[..., None])[..., 0]
+        return np.concatenate([x_answer.ravel(), s_answer.ravel()])
 
     def _points(self, constants: Array) -> Array:
         """Return the solution of the block-tridiagonal system."""
@@ -264,7 +237,7 @@ class _Iterate:
         high = np.concatenate([programme.high.ravel(), programme.upper_bound.ravel()])
         self._programme, self._bounds = programme, np.stack([low, -high])
         self._cost = np.zeros(programme.size)
-        programme.split(self._cost)[2][:] = programme.cost
+        programme.split(self._cost)[1][:] = programme.cost
         self.total = float(np.abs(programme.cost).sum())
         self.y = np.zeros(programme.size)
         self._value = np.zeros(low.size)
@@ -315,19 +288,6 @@ class _Iterate:
         self._slack = slack + step * d_slack
         self._force = force + min(1.0, _STEP * _length(force, d_force)) * d_force
         return size
-
-
-def weighted_least_squares(programme: SegmentProgramme, target: Array, fixed: float) -> Array:
-    """Return y (size,) for which the rows are nearest to a target (K, n, R) in the sum of squares.
-
-    Args:
-        programme: Its rows and its weight count.
-        target: What the rows shall be.
-        fixed: Weight of s, which shall be zero.
-    """
-    scale = np.concatenate([np.ones(programme.low.size), np.full(programme.cost.size, fixed)])
-    constants = np.concatenate([target.ravel(), np.zeros(programme.cost.size)])
-    return _Newton(programme, scale).solve(programme.adjoint(constants))
 
 
 def _length(values: Array, changes: Array) -> float:

@@ -9,10 +9,11 @@
 7. Free knots, ten in each segment, from equal times.
 8. Free knots, sixteen in each segment, from the times of the best motion so far.
 
-Each gives velocities and accelerations at the points, which are then improved until no more is gained. A
-motion that stops at each point is always among those that are compared. Once a motion is as fast as the
-proven bound, no further starting points are tried. The states that are found are rounded, so that the last
-bits of linear algebra, which differ between processors, do not show.
+Each gives velocities and accelerations at the points, which are then improved until no more is gained, or
+left where they come nearer to the best so far too slowly. A motion that stops at each point is always among
+those that are compared. Once a motion is as fast as the proven bound, no further starting points are tried.
+The states that are found are rounded, so that the last bits of linear algebra, which differ between
+processors, do not show.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.planners.fastest_through_points.free_knots import states_by_free_knots
+from trajcli.planners.fastest_through_points.free_knots.interior_point import fastest_knots
+from trajcli.planners.fastest_through_points.free_knots.knot_motion import KnotProblem
 from trajcli.planners.fastest_through_points.position_limits import with_limits_near
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.states import (
@@ -39,6 +41,9 @@ _PROVEN = 1e-7  # relative: a motion this near to the bound is the fastest
 _GRID, _COST = 2.0**-21, 1e-6  # relative: to what states are rounded, and how much longer that may last
 _ALIKE = 1e-3  # relative: durations this near to the shortest agree with it
 _SHORT = 0.05  # of the longest time at the velocity limits: no segment begins with less
+
+_FAR = 100.0  # for a position limit that does not bind, in units of the joints
+_LEAST = 1e-3  # of the intervals to begin with: none becomes shorter
 
 Start = Callable[[WaypointProblem, StateMotion, StateMotion], Array]
 
@@ -112,7 +117,9 @@ def _found(problem: WaypointProblem, starts: Sequence[Start], lower: float, know
         if durations and best.duration <= lower * (1 + _PROVEN):
             break
         report_progress(f"starting point {number} of {len(starts)}")
-        motion = improved(problem, within_position_limits(problem, start(problem, stopping, best)))
+        motion = improved(
+            problem, within_position_limits(problem, start(problem, stopping, best)), best.duration
+        )
         durations.append(motion.duration)
         if motion.duration < best.duration:
             best = motion
@@ -137,6 +144,37 @@ def _speed_times(problem: WaypointProblem) -> Array:
     times = np.where(steps > 0, steps / bounds[:, 1], steps / bounds[:, 0]).max(axis=1)
     times = np.maximum(times, problem.least)
     return np.asarray(np.maximum(times, _SHORT * float(times.max())))
+
+
+def states_by_free_knots(problem: WaypointProblem, times: Array, intervals: int) -> Array:
+    """Return states (K + 1, n, 2) at the points of a fast motion with free knots.
+
+    Args:
+        problem: Points and limits.
+        times: Of the segments to begin with, shape (K,).
+        intervals: In each segment, at least four.
+    """
+    knots = knot_problem(problem, times, intervals)
+    speeds = problem.scales[:, 0]
+    scales = np.stack([speeds, speeds / knots.time], axis=1)
+    ends = fastest_knots(knots, times / knots.time, problem.states / scales)
+    return np.where(problem.fixed, problem.states, ends * scales)
+
+
+def knot_problem(problem: WaypointProblem, times: Array, intervals: int) -> KnotProblem:
+    """Return the problem with so many intervals, for segments that last about so long (K,)."""
+    time, speeds = float(times.mean()), problem.scales[:, 0]
+    room = np.abs(problem.position - problem.points[..., None]) / (speeds * time)[:, None]
+    return KnotProblem(
+        time,
+        np.stack([problem.velocity.T / speeds, problem.acceleration.T / (speeds / time)]),
+        problem.jerk * time**2 / speeds,
+        problem.steps / (speeds * time),
+        problem.least / time,
+        np.repeat(_LEAST * times[:, None] / time / intervals, intervals, axis=1),
+        ~problem.fixed,
+        np.minimum(room, _FAR) if problem.walled else None,
+    )
 
 
 def _from_stopping(intervals: int, part: float) -> Start:

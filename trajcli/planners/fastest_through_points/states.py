@@ -23,11 +23,13 @@ from trajcli.planners.fastest_through_points.state_times import (
 )
 
 _FAR = 100.0  # for a bound that does not bind, in units of the scales or of the durations
-_FIRST, _LARGEST, _SMALLEST = 0.2, 0.5, 2e-5  # trust region, of the scales of the states
+_FIRST, _LARGEST, _SMALLEST = 0.2, 0.5, 1e-4  # trust region, of the scales of the states
 _SLOWER, _SLOWINGS = 0.85, 40  # by how much, and how often, a joint that leaves its position limits is slowed
+_SHRUNK = 0.4
+_PATIENCE, _HOPE = 4, 0.25  # rounds, and the part of what is behind a rival that they must gain
 _GOOD, _POOR = 0.7, 0.3  # of the gain that was foreseen
 _TIME, _STATE, _RAMP, _WALLS, _WITH_WALLS = 0, 1, 3, 5, 7  # rows of a segment and joint, and how many
-_ENOUGH = 1e-7  # relative: a foreseen gain below it is none
+_ENOUGH = 1e-6  # relative: a foreseen gain below it is none
 
 
 @frozen
@@ -76,14 +78,26 @@ def within_position_limits(problem: WaypointProblem, states: Array) -> StateMoti
     return evaluated(problem, inside)
 
 
-def improved(problem: WaypointProblem, motion: StateMotion, rounds: int = 60) -> StateMotion:
-    """Return a motion that lasts no longer, after at most so many linear programmes."""
+def improved(
+    problem: WaypointProblem, motion: StateMotion, rival: float = np.inf, rounds: int = 60
+) -> StateMotion:
+    """Return a motion that lasts no longer, after at most so many linear programmes.
+
+    Args:
+        problem: Points and limits.
+        motion: To begin with.
+        rival: A duration that is known to be possible, s: a motion that nears it too slowly is left.
+        rounds: How many linear programmes.
+    """
     if problem.segments == 1 or not np.isfinite(motion.duration):
         return motion
     region, known = _FIRST, state_times(problem, motion.states, motion.times)
+    history = [motion.duration] * _PATIENCE
     for _ in range(rounds):
-        if region < _SMALLEST:
+        late, gained = len(history) > 2 * _PATIENCE, history[-_PATIENCE] - motion.duration
+        if region < _SMALLEST or (late and gained < _HOPE * (motion.duration - rival)):
             break
+        history.append(motion.duration)
         change, foreseen = _step(problem, motion, known, region)
         if foreseen <= _ENOUGH * motion.duration:
             break
@@ -95,7 +109,7 @@ def improved(problem: WaypointProblem, motion: StateMotion, rounds: int = 60) ->
         if gain >= _GOOD * foreseen:
             region = min(2 * region, _LARGEST)
         elif gain < _POOR * foreseen:
-            region *= 0.4
+            region *= _SHRUNK
     return motion
 
 
@@ -122,7 +136,7 @@ def _step(
     least = np.maximum((problem.least - usual) / unit, -_FAR)[:, None]
     far = np.full((segments, 1), _FAR)
     programme = SegmentProgramme(rows, low, high, np.ones((segments, 1)), least, far)
-    _, x, s = programme.split(solved(programme, region, exactness=1e-4))
+    x, s = programme.split(solved(programme, region, exactness=1e-3))
     return x * problem.scales, -float(s.sum()) * unit
 
 

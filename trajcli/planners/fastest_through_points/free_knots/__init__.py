@@ -1,0 +1,1 @@
+"""Fast motions of piecewise constant jerk with free knots, by an interior-point method."""
