@@ -236,3 +236,27 @@ def test_what_no_float_holds_is_not_proven(wrong):
     assert rest_of(values, (wrong,)).upper_bound == np.inf
     values[0, 3, 1] = wrong
     assert rest_of(values).upper_bound == np.inf
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+@pytest.mark.parametrize("piece", range(3))
+def test_one_remainder_that_no_float_holds_is_enough(piece, wrong):
+    remainder = np.zeros(3)
+    remainder[piece] = wrong
+    peak = rest_of(np.zeros((3, 9, 1)), remainder)
+    assert (peak.value, peak.upper_bound) == (np.inf, np.inf)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_what_was_reached_is_not_lost_where_another_piece_is_looked_at_closely(first):
+    """A piece that reaches 1 beside one whose control points are above that, and whose curve is not."""
+    hump = 0.98 * (4.0 * NODES * (1.0 - NODES)) ** 4
+    hull = hull_matrices()[0] @ hump
+    assert hull.max() > 1.2
+    values = np.stack([np.linspace(0.0, 1.0, 9), hump] if first else [hump, np.linspace(0.0, 1.0, 9)])[
+        ..., None
+    ]
+    peak = rest_of(values, (0.0, 0.0), size=total)
+    assert peak.value == pytest.approx(1.0, abs=1e-12)
+    assert peak.time == pytest.approx(3.0 if first else 5.0)
+    assert 1.0 <= peak.upper_bound <= 1.0 + 1e-6

@@ -251,6 +251,34 @@ def test_peaks_are_of_the_motion_as_it_is_unless_asked_otherwise():
     assert survey.peak(0, 1, np.inf).upper_bound == pytest.approx(50.05)
 
 
+def test_peaks_in_either_direction_are_of_the_motion_as_it_is():
+    """The same lift falls as it rose: without gravity what it needs downwards is what it needed upwards."""
+    rows = np.array([2.0, 0.0, 0.0])[:, None, None]
+    up, down = (effort_survey(lift(5.0, gravity=0.0), np.array([0.0, 1.0]), sign * rows) for sign in (1, -1))
+    assert up.highest()[0].upper_bound == pytest.approx(20.0)
+    assert down.lowest()[0].upper_bound == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_what_rounding_makes_of_rest_at_either_end_turns_no_joint(reverse):
+    """A joint trembles by 1e-13 in the first tenth of a piece, or in the last, and else moves one way."""
+    t = np.linspace(0.0, 1.0, 11)
+    wave = np.poly1d([1.0, -0.05]) * np.poly1d([1.0, -0.09]) * 1e-11  # of its speed, zero at 0.05 and 0.09
+    speed = wave + np.poly1d([1.0, 0.0]) ** 6
+    roots = np.sort(speed.roots[np.isreal(speed.roots)].real)
+    inner = roots[(roots > 0) & (roots < 1)]
+    assert np.abs(speed(t[:2])).max() < 1e-5
+    still = 1e-5
+    coefficients = np.polyint(speed).coeffs
+    if reverse:
+        mirrored = np.polyint(speed)(np.poly1d([-1.0, 1.0]))
+        inner, coefficients = np.sort(1 - inner), -mirrored.coeffs
+    planted = np.sort(np.append(inner, 0.95 if reverse else 0.05))
+    assert effort_bound._turns(planted, coefficients, 1.0, still).size == 0
+    middle = np.append(planted, 0.5)
+    assert effort_bound._turns(np.sort(middle), coefficients, 1.0, still).tolist() == [0.5]
+
+
 @pytest.mark.filterwarnings("error")
 def test_what_no_float_holds_is_not_proven():
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,0 +1,309 @@
+"""The tool in every row and between them: planted faults in each block, in the first and in the last row.
+
+The arm is one link that turns, and a slide; its tool moves with L q' and with the slide's velocity, and the
+largest slopes of Hermite interpolants from rest to rest are known. On a path it is the arm of a planned line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import trajcli
+from trajcli.api.plans import PlannedJob
+from trajcli.columns import parse_column
+from trajcli.findings import Finding
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.judge.recorded_tool import ToolJudge
+from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
+from trajcli.judge.tool_columns import ToolTable, judge_tool_columns
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.jacobian import tcp_twist
+from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution, blocks_of_size
+
+LEVER, OFF, PERIOD = 0.5, 1e-6, 0.008
+SIDES = pytest.mark.parametrize("side", [1.0, -1.0])
+
+
+def link(joints: Limits | None = None, **tcp: float) -> Robot:
+    """Return a joint that turns the tool at a distance of half a metre, and a slide along its axis."""
+    limits = replace(joints or unlimited(2), tcp=ToolLimits(**tcp))
+    both = (Joint("turn", "revolute", a=LEVER), Joint("slide", "prismatic"))
+    return Robot("link", both, limits, "standard", np.eye(4), np.eye(4))
+
+
+def rows(t: np.ndarray, *columns: np.ndarray | None, off: float = 0.0, late: float = 0.0) -> RecordedMotion:
+    every = [*columns, None, None][:3]
+    roundings = np.full(every[0].shape[1], off), np.zeros(every[0].shape[1]), np.zeros(every[0].shape[1])
+    return RecordedMotion(t, *every, None, None, None, None, Resolution(late, *roundings), "rows")
+
+
+def of_tool(motion: RecordedMotion, robot: Robot, interpolate: str | None = None) -> list[Finding]:
+    required = Requirements(robot, interpolate=interpolate, tool=lambda: ToolJudge(robot))
+    findings = judge_motion(lambda: [motion], required).findings
+    return [each for each in findings if each.kind.startswith("tool_")]
+
+
+@SIDES
+@pytest.mark.parametrize("key", ["speed", "angular_speed"])
+@pytest.mark.parametrize("piece", [0, 1, 2046, 2047, 2048, 2498])
+def test_a_fast_piece_anywhere_in_a_long_file_is_found(piece: int, key: str, side: float) -> None:
+    """More pieces than are looked at together; the slide beside moves in another one, slowly."""
+    t = np.append(0.0, np.cumsum(0.02 + 0.01 * (np.arange(2499) % 3)))
+    q = np.zeros((2500, 2))
+    q[piece + 1 :, 0], q[1200:, 1] = side * 0.01, 1e-4
+    rate = 0.01 / (t[piece + 1] - t[piece]) * (LEVER if key == "speed" else 1.0)
+    (found,) = of_tool(rows(t, q), link(**{key: 0.9 * rate}))
+    assert (found.kind, found.severity, found.certainty) == (f"tool_{key}", "error", "exceeded")
+    assert found.row in (piece + 1, piece + 2)
+    assert t[piece] - 1e-9 <= found.time <= t[piece + 1] + 1e-9
+    assert found.value == pytest.approx(rate, rel=1e-6)
+    assert of_tool(rows(t, q), link(**{key: 1.001 * rate})) == []
+
+
+ORDERS = {
+    "speed": (1.875, 1),
+    "angular_speed": (1.875, 1),
+    "acceleration": (10 / 3**0.5, 2),
+    "angular_acceleration": (10 / 3**0.5, 2),
+    "jerk": (60.0, 3),
+    "angular_jerk": (60.0, 3),
+}
+"""Largest derivative of a quintic from rest to rest over 1 in a time 1, and its order (Biagiotti, section 2.1)."""
+
+
+@pytest.mark.parametrize(("planted", "certainty"), [(0.5, "within rounding"), (1.5, "exceeded")])
+@pytest.mark.parametrize("piece", [0, 3])
+@pytest.mark.parametrize("key", ORDERS)
+def test_rounding_of_rows_explains_so_much_of_the_tool(
+    key: str, piece: int, planted: float, certainty: str
+) -> None:
+    """The link turns by 1e-3 in one piece, which is off by twice the rounding of the rows; the slide is as rough."""
+    t = np.array([0.0, 0.3, 0.8, 1.2, 1.9])
+    factor, order = ORDERS[key]
+    q, still = np.zeros((5, 2)), np.zeros((5, 2))
+    q[piece + 1 :, 0] = 1e-3
+    share = factor / (t[piece + 1] - t[piece]) ** order
+    lever = 1.0 if key.startswith("angular") else LEVER
+    slide = 2 * LEVER * share * 2 * OFF  # of both joints, each at the distance of the arm
+    limit = lever * share * 1e-3 - planted * slide
+    (found,) = of_tool(rows(t, q, still, still, off=OFF), link(**{key: limit}), "quintic")
+    assert (found.kind, found.severity, found.certainty) == (f"tool_{key}", "error", certainty)
+    assert found.value == pytest.approx(lever * share * 1e-3, rel=1e-4)
+    assert found.rounding == pytest.approx(slide, rel=1e-2)
+
+
+@SIDES
+@pytest.mark.parametrize("at", [0, 4, 8])
+@pytest.mark.parametrize("key", ["speed", "angular_speed"])
+def test_a_tool_that_only_the_curve_makes_too_fast_is_a_warning(key: str, at: int, side: float) -> None:
+    """The mean is 1, the ends of one piece have 0.8: a cubic reaches 0.8 + 3/2 0.2 in its middle."""
+    lever = LEVER if key == "speed" else 1.0
+    for period, peaked, limit, severity in (
+        (PERIOD, 0.8, 1.05, "warning"),
+        (PERIOD, 0.8, 0.99, "error"),  # the mean of two rows is over it
+        (0.02, 0.8, 1.05, "error"),  # they stand too far apart
+        (PERIOD, -1.5, 2.2, "error"),  # more than twice the limit
+    ):
+        t = period * np.arange(10)
+        q, qd = np.zeros((10, 2)), np.zeros((10, 2))
+        q[:, 0], qd[:, 0] = side * t, side
+        qd[at : at + 2, 0] = side * peaked
+        peak = peaked + 1.5 * (1 - peaked)
+        if peaked < 0:
+            limit = 0.49 * peak
+        motion = rows(t, q, qd)
+        (found,) = of_tool(motion, link(**{key: lever * limit}))
+        assert (found.severity, found.certainty) == (severity, "exceeded"), (period, limit)
+        assert found.value == pytest.approx(lever * peak, rel=1e-5)
+        (asked,) = of_tool(motion, link(**{key: lever * limit}), "cubic")
+        assert asked.severity == "error"
+
+
+@SIDES
+@pytest.mark.parametrize("at", [0, 4, 8])
+@pytest.mark.parametrize("key", ["acceleration", "angular_acceleration"])
+def test_an_acceleration_of_the_tool_between_dense_rows_is_a_warning(key: str, at: int, side: float) -> None:
+    """Velocities gain 1 m/s^2 in the mean, and one distance is a little short: its cubic bends by 0.2 more."""
+    lever = LEVER if key == "acceleration" else 1.0
+    t = PERIOD * np.arange(10)
+    q, qd = np.zeros((10, 2)), np.zeros((10, 2))
+    qd[:, 0] = side * 0.01 * t / PERIOD * PERIOD
+    q[:, 0] = side * 0.01 * t**2 / 2
+    q[at + 1 :, 0] -= side * 0.01 * 0.2 * PERIOD**2 / 6
+    for limit, severity in ((1.1, "warning"), (0.99, "error")):
+        (found,) = of_tool(rows(t, q, qd), link(**{key: lever * 0.01 * limit}))
+        assert (found.kind, found.severity) == (f"tool_{key}", severity)
+        assert found.value == pytest.approx(lever * 0.01 * 1.2, rel=1e-3)
+
+
+# --- along a path ---
+
+JOB = {
+    "version": 1,
+    "robot": "ur5e",
+    "limits": {"acceleration": 20.0},
+    "start": {"joints": [0.2, -1.2, 1.6, -1.0, -1.3, 0.4]},
+    "moves": [
+        {"planner": "line", "to": {"xyz": [0.45, 0.25, 0.35]}, "law": {"shape": "quintic", "duration": 2}}
+    ],
+}
+
+
+@cache
+def plan() -> PlannedJob:
+    return trajcli.plan(JOB)
+
+
+@cache
+def line(rate: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return stamps, positions and velocities of the line."""
+    sampled = plan().trajectory.sample(rate)
+    return sampled.t, np.round(sampled.q, 9), np.round(sampled.qd, 9)
+
+
+def deviations(q: np.ndarray, t: np.ndarray, qd: np.ndarray | None = None, size: int = 5000) -> list[Finding]:
+    robot, off = plan().moves[0].robot, np.full(6, 0.5e-9)
+    moves = np.zeros(len(t), int)
+    motion = RecordedMotion(t, q, qd, None, None, None, moves, None, Resolution(0.0, off, off, off), "rows")
+    required = Requirements(robot, tool=lambda: ToolJudge(robot, {0: plan().moves[0].planned.tool}))
+    found = judge_motion(lambda: blocks_of_motion(motion, size), required).findings
+    return [each for each in found if each.kind == "deviation"]
+
+
+def blocks_of_motion(motion: RecordedMotion, size: int) -> list[RecordedMotion]:
+    names = ("t", "q", "qd", "qdd", "move")
+    return [
+        replace(
+            motion,
+            first_row=motion.first_row + low,
+            **{
+                name: None if getattr(motion, name) is None else getattr(motion, name)[low : low + size]
+                for name in names
+            },
+        )
+        for low in range(0, len(motion.t), size)
+    ]
+
+
+@cache
+def aside() -> np.ndarray:
+    """Return a unit vector square to the line."""
+    _, q, _ = line(60)
+    ends = forward(plan().moves[0].robot, q[[0, -1]])[:, :3, 3]
+    across = np.cross(ends[1] - ends[0], [1.0, 0.0, 0.0])
+    return across / np.linalg.norm(across)
+
+
+def moved(q: np.ndarray, along: np.ndarray, about: np.ndarray) -> np.ndarray:
+    """Return joint velocities that move the tool, and turn it, to first order."""
+    return np.linalg.solve(trajcli.load_robot("ur5e").jacobian(q), np.concatenate([along, about]))
+
+
+@pytest.mark.parametrize(
+    ("row", "quantity", "side", "size"),
+    [
+        (0, "position", 1.0, 5000),
+        (1023, "orientation", 1.0, 5000),
+        (1024, "position", -1.0, 5000),
+        (1099, "position", 1.0, 5000),
+        (1099, "orientation", -1.0, 700),
+        (700, "position", 1.0, 700),
+    ],
+)
+def test_a_row_beside_its_path_is_found_wherever_it_stands(
+    row: int, quantity: str, side: float, size: int
+) -> None:
+    """Rows that end on their way; more of them than are looked at together."""
+    t, q, _ = (each[:1100].copy() for each in line(555))
+    by, nothing = side * 2e-4 * aside(), np.zeros(3)
+    q[row] += moved(q[row], by, nothing) if quantity == "position" else moved(q[row], nothing, by)
+    (found,) = deviations(q, t, size=size)
+    assert (found.row, found.quantity) == (row + 1, quantity)
+    assert (found.severity, found.certainty) == ("error", "exceeded")
+    assert found.value == pytest.approx(2e-4, rel=2e-2)
+
+
+@SIDES
+@pytest.mark.parametrize("row", [1, 60, 119])
+def test_a_curve_beside_its_path_between_rows_is_found(row: int, side: float) -> None:
+    """A velocity that is off by w puts the middles beside it off by w T / 8, and no row."""
+    t, q, qd = line(60)
+    turned = qd.copy()
+    turned[row] += moved(q[row], side * 8 * 2e-4 * 60 * aside(), np.zeros(3))
+    assert deviations(q, t, qd) == []
+    found = {each.quantity: each for each in deviations(q, t, turned)}["position"]
+    assert found.value == pytest.approx(2e-4, rel=0.1)
+    assert abs(found.time - t[row]) == pytest.approx(0.5 / 60, rel=1e-6)
+
+
+# --- columns of the tool beside joints ---
+
+COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz")
+
+
+def columns_beside(
+    q: np.ndarray, qd: np.ndarray, values: np.ndarray, size: int = 40, half: float = 0.0
+) -> list[Finding]:
+    """Return what pose and twist are found to be wrong, in blocks of some rows."""
+    robot, count = link(), len(q)
+    t = PERIOD * np.arange(count)
+    motion = rows(t, q, qd)
+    every = tuple(parse_column(name) for name in COLUMNS)
+    table = ToolTable(every, np.full(len(every), half), lambda: blocks_of_size([values], size))
+    arms = ArmsOfMoves(robot, [])
+    return judge_tool_columns(blocks_of_motion(motion, size), table, arms, None, arms)
+
+
+def true_columns(count: int = 90) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return joints, their velocities, and what they make of the tool."""
+    u = np.arange(count) * PERIOD
+    q, qd = np.stack([np.sin(u), 0.1 * u], axis=1), np.stack([np.cos(u), 0.1 + 0 * u], axis=1)
+    poses = forward(link(), q)
+    half = q[:, 0] / 2
+    turned = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
+    return q, qd, np.hstack([poses[:, :3, 3], turned, tcp_twist(link(), q, qd)])
+
+
+def test_what_joints_make_of_the_tool_is_no_fault() -> None:
+    q, qd, values = true_columns()
+    assert columns_beside(q, qd, values) == []
+    values[:, 3:7] *= -1.0  # the same orientation
+    assert columns_beside(q, qd, values) == []
+
+
+@SIDES
+@pytest.mark.parametrize("row", [0, 39, 40, 80, 89])
+@pytest.mark.parametrize("column", [0, 1, 2, 7, 8, 9, 10, 11, 12])
+def test_one_wrong_number_of_the_tool_is_found(column: int, row: int, side: float) -> None:
+    q, qd, values = true_columns()
+    quantity = "position" if column < 3 else "velocity" if column < 10 else "angular velocity"
+    values[row, column] += side * 5e-9
+    (found,) = columns_beside(q, qd, values)
+    assert (found.quantity, found.row, found.severity) == (quantity, row + 1, "error")
+    assert found.value == pytest.approx(5e-9, rel=1e-3)
+    assert columns_beside(q, qd, values, half=5e-9) == []
+
+
+@pytest.mark.parametrize("length", [0.9, 1.1])
+@pytest.mark.parametrize("row", [0, 89])
+def test_a_quaternion_of_another_length_is_none(row: int, length: float) -> None:
+    q, qd, values = true_columns()
+    values[row, 3:7] *= length
+    (found,) = columns_beside(q, qd, values)
+    assert (found.quantity, found.row) == ("orientation", row + 1)
+    assert found.value == pytest.approx(0.1, rel=1e-6)
+
+
+@pytest.mark.parametrize("angle", [1e-6, -1e-6, 3.0, np.pi])
+def test_a_turned_quaternion_is_found_by_how_much(angle: float) -> None:
+    q, qd, values = true_columns()
+    half = (q[50, 0] + angle) / 2
+    values[50, 3:7] = np.cos(half), 0.0, 0.0, np.sin(half)
+    (found,) = columns_beside(q, qd, values)
+    assert (found.quantity, found.row) == ("orientation", 51)
+    assert found.value == pytest.approx(abs(angle), rel=1e-4)
