@@ -62,13 +62,17 @@ class UniformGrid:
 
     def blocks(self, size: int = ROWS) -> Iterator[tuple[Array, Array]]:
         """Yield, for `size` rows at a time, their times as written and from the start, each (N,), s."""
-        count = self.count
-        for low in range(0, count, size):
-            high = min(low + size, count)
-            local = np.arange(low, high) / self.rate
-            if high == count:
-                local[-1] = self.duration
+        for low in range(0, self.count, size):
+            local = self.local(low, low + size)
             yield self.start_time + local, local
+
+    def local(self, low: int, high: int) -> Array:
+        """Return the times of the rows from one index up to another or the end, from the start, (N,), s."""
+        count = self.count
+        times = np.arange(low, min(high, count)) / self.rate
+        if high >= count and times.size:
+            times[-1] = self.duration
+        return times
 
 
 @frozen

@@ -10,6 +10,7 @@ from joined_by_scipy import largest_share
 from tiers import few
 
 import trajcli
+from trajcli.grids import UniformGrid
 from trajcli.job.read import load_job
 from trajcli.output.delivery import joined_rows as module
 from trajcli.output.delivery.joined import joined_rows, rows_report, rows_that_keep, with_event
@@ -68,6 +69,32 @@ def test_no_row_is_read_where_the_curve_itself_proves_it(monkeypatch: pytest.Mon
     rows = joined_rows(plan, grid_of(plan), FORMATS["csv"])
     judged = rows.judgement()
     assert (judged is not None and judged.events, read) == ((), [])
+
+
+def test_of_very_many_rows_only_those_about_breaks_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 10^9 rows; and the blocks that are chosen are those in which anything is found among all."""
+    plan = planned("sync", "limits.velocity=1e-7")
+    rows = joined_rows(plan, grid_of(plan), FORMATS["csv"])
+    assert rows.grid.count == 10**9 + 1
+    judged = rows.judgement()
+    assert judged is not None
+    assert {found.kind for found in judged.findings} == {"velocity"}
+    assert max(found.excess for found in judged.findings) == pytest.approx(
+        1.512
+    )  # of the quintic, as at 1 deg/s
+    assert rows.rounding() > 0
+    monkeypatch.setattr(module, "_ROWS", 16)
+    for other in (planned("ur5e_pick", "output.rate=333"), planned("septic")):
+        rows = joined_rows(other, grid_of(other), FORMATS["csv"])
+        grid, degree = rows.grid, 5
+        assert isinstance(grid, UniformGrid)
+        chosen = {*rows._unproven_blocks(grid, degree)}
+        every = range(-(-grid.count // 16))
+        needed = {
+            k for k in every if rows._unproven(grid.local(max(16 * k - 1, 0), 16 * k + 16), degree).size
+        }
+        assert needed <= chosen
+        assert list(rows._unproven_blocks(grid, degree)) == sorted(chosen)
 
 
 def test_a_named_cure_cures() -> None:

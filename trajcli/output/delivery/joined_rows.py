@@ -159,7 +159,7 @@ class JoinedRows:
     def same_curve(self) -> bool:
         """Whether the joined curve is the planned one itself, by its degree and its breaks."""
         chosen = self.interpolation
-        blocks = () if chosen is None else self._blocks()
+        blocks = () if chosen is None else self._blocks(_DEGREES[chosen])
         return chosen is not None and not any(self._unproven(t, _DEGREES[chosen]).size for t, _ in blocks)
 
     def rounding(self) -> float:
@@ -172,7 +172,7 @@ class JoinedRows:
         chosen, plan = self.interpolation, self.plan
         if chosen is None or self.grid.count == 1:
             return 0.0
-        length = min(float(np.diff(times).min()) for times, _ in self._blocks() if times.size > 1)
+        length = self._shortest()
         factors = joint_factors(plan.trajectory.joint_types, plan.loaded.output_units)
         unit = 2 * _HALF_UNIT * np.asarray(factors) / length ** np.arange(1, 4)[:, None]
         noise = unit[: len(_OF_ROUNDING[chosen])] * np.array(_OF_ROUNDING[chosen])[:, None]
@@ -211,7 +211,7 @@ class JoinedRows:
         """Yield the intervals in which the joined curve may be another than the planned one, many at once."""
         kept: list[tuple[Array, NDArray[np.int64]]] = []
         count = 0
-        for times, first in self._blocks():
+        for times, first in self._blocks(_DEGREES[chosen]):
             index = self._unproven(times, _DEGREES[chosen])
             for low in range(0, index.size, _JUDGED):
                 part = index[low : low + _JUDGED]
@@ -223,13 +223,41 @@ class JoinedRows:
         if kept:
             yield self._pairs(kept, chosen)
 
-    def _blocks(self) -> Iterator[tuple[Array, int]]:
-        """Yield times of rows from the start, with the last one before them, and the index of the first."""
+    def _shortest(self) -> float:
+        """Return the shortest distance of two rows, s."""
+        grid = self.grid
+        if isinstance(grid, UniformGrid):
+            last = grid.local(grid.count - 2, grid.count)
+            return float(last[1] - last[0] if grid.count == 2 else min(1.0 / grid.rate, last[1] - last[0]))
+        return float(np.diff(np.concatenate([local for _, local in grid.blocks(_ROWS)])).min())
+
+    def _blocks(self, degree: int) -> Iterator[tuple[Array, int]]:
+        """Yield times of rows from the start, with the last one before them, and the index of the first.
+
+        Of rows of one rate, which may be very many, only blocks in which an interval may be unproven.
+        """
+        if isinstance(self.grid, UniformGrid):
+            for number in self._unproven_blocks(self.grid, degree):
+                low = max(number * _ROWS - 1, 0)
+                yield self.grid.local(low, (number + 1) * _ROWS), low
+            return
         before, first = np.empty(0), 0
         for _, local in self.grid.blocks(_ROWS):
             times = np.append(before, local)
             yield times, first - before.size
             before, first = local[-1:], first + local.size
+
+    def _unproven_blocks(self, grid: UniformGrid, degree: int) -> Iterator[int]:
+        """Yield the blocks of rows about breaks, and on pieces that are no curve of the rows, rising."""
+        breaks, count = self.plan.trajectory.curve.breaks, grid.count
+        other = np.flatnonzero(self._others(degree))
+        begins, ends = np.append(breaks, breaks[other]), np.append(breaks, breaks[other + 1])
+        first = np.clip(np.floor(begins * grid.rate) - 2, 0, count - 1) // _ROWS
+        last = np.clip(np.floor(ends * grid.rate) + 3, 0, count - 1) // _ROWS
+        done = -1
+        for k in np.argsort(first, kind="stable").tolist():
+            yield from range(max(int(first[k]), done + 1), int(last[k]) + 1)
+            done = max(done, int(last[k]))
 
     def _unproven(self, times: Array, degree: int) -> NDArray[np.int64]:
         """Return the intervals in which the curve is not what their rows determine, rising indices."""
@@ -256,6 +284,15 @@ class JoinedRows:
 
     def _others(self, degree: int) -> NDArray[np.bool_]:
         """Return which pieces are not of the degree of the joined curve, nor as near to one as counts."""
+        if degree not in self._others_of_degree:
+            self._others_of_degree[degree] = self._pieces_of_others(degree)
+        return self._others_of_degree[degree]
+
+    @cached_property
+    def _others_of_degree(self) -> dict[int, NDArray[np.bool_]]:
+        return {}
+
+    def _pieces_of_others(self, degree: int) -> NDArray[np.bool_]:
         curve = self.plan.trajectory.curve
         other: NDArray[np.bool_] = np.any(curve.coefficients[: -(degree + 1)], axis=(0, 2))
         if degree > 1 and isinstance(self.grid, UniformGrid) and other.any():
