@@ -224,3 +224,18 @@ def test_goals_for_the_trajectory_controller(
     assert {found["severity"] for found in findings} == {severity}
     assert row is None or findings[0]["row"] == row
     assert severity == "warning" or code == 1
+
+
+def test_what_a_plan_for_a_consumer_writes_is_checked_for_it(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """At its knots the acceleration is at its limit but for the last bits: there, too."""
+    text = (Path(__file__).parents[2] / "examples" / "blends_ur5e.yaml").read_text()
+    job, rows = tmp_path / "job.yaml", str(tmp_path / "rows.csv")
+    job.write_text(f"{text}when_over_limit: slow\n")
+    assert call(capfd, "plan", job, "--for", "ros-jtc", "-o", rows).code == 0
+    code, out, _ = call(capfd, "check", rows, "--job", job, "--for", "ros-jtc", "--json")
+    assert (code, json.loads(out)["planned_rows"]) == (0, True), out
+    faster = tmp_path / "faster.yaml"  # the same rows against limits that they pass by a thousandth
+    faster.write_text(f"{text}when_over_limit: slow\n".replace("acceleration: 600", "acceleration: 599.4"))
+    assert call(capfd, "check", rows, "--job", faster, "--for", "ros-jtc", "--json").code == 1

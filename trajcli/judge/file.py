@@ -12,7 +12,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
 from trajcli.findings import Finding
 from trajcli.frozen import comparable, frozen
-from trajcli.judge.judgement import Judgement, as_planned, worst_first
+from trajcli.judge.judgement import Judgement, as_joined, as_planned, worst_first
 from trajcli.judge.motion import JUDGED_ROWS, Requirements, judge_motion
 from trajcli.kinematics.robot import Robot
 from trajcli.streams.byte_source import ByteSource
@@ -214,7 +214,7 @@ def _beside_plan(judgement: Judgement, found: RowComparison | None, options: Che
     if found.planned and options.interpolate is None and options.profile is None:
         return as_planned(judgement)
     if found.planned:
-        return replace(judgement, planned_rows=True)
+        return as_joined(judgement)
     note = f"these are no rows of the motion that the job plans: {found.difference}"
     return replace(judgement, notes=(*judgement.notes, note), planned_rows=False)
 
