@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from motions import between, limits, state, trajectory
 
+from trajcli.checks import continuity
 from trajcli.checks.continuity import JERK_HINT, acceleration_steps, check_continuity
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.trajectory import State, Trajectory
@@ -285,3 +287,39 @@ def test_exactly_the_jumps_that_were_put_in_are_found(data) -> None:
     for finding in found:
         nearest = np.abs(curve.breaks - finding.time).min()
         assert nearest <= 1e-12 * curve.end
+
+
+@pytest.mark.parametrize("block", [1, 2, 3, 16_384])
+@pytest.mark.parametrize("at", range(5))
+@pytest.mark.parametrize("order", range(3))
+def test_a_jump_at_any_break_is_found_and_has_its_time(order: int, at: int, block: int, monkeypatch) -> None:
+    """Four pieces at rest but for one derivative that jumps by 1; at the start and at the end against the states."""
+    monkeypatch.setattr(continuity, "_BLOCK", block)
+    rows = np.zeros((3, 4, 2))
+    rows[2 - order, at:, 1] = 1.0 if order < 2 else 0.5
+    for k in range(4):  # what follows from it
+        if order > 0:
+            q, v = (rows[2, k, 1], rows[1, k, 1])
+            following = np.array([q + v * 0.5 + rows[0, k, 1] * 0.25, v + rows[0, k, 1]])
+            if k < 3:
+                rows[2, k + 1, 1] = following[0]
+                rows[1, k + 1, 1] = following[1] if order == 2 else rows[1, k + 1, 1]
+    curve = PiecewisePolynomial(0.5 * np.arange(5.0), rows)
+    end = [curve.piece_ends(k)[1][-1].copy() for k in range(3)]
+    if at == 4:
+        end[order][1] += 1.0
+    whole = trajectory(curve, start=state([0.0, 0.0]), end=State(*end))
+    (found,) = check_continuity(whole, [limits(2, jerk=1e9)])
+    assert (found.kind, found.joint, found.move) == (f"{QUANTITIES[order]}_jump", "j2", 0)
+    assert [found.time, found.value] == pytest.approx([0.5 * at, 1.0])
+    steps = [(step.time, step.joint, step.size) for step in acceleration_steps(whole, [limits(2)])]
+    assert steps == ([(pytest.approx(0.5 * at), "j2", pytest.approx(1.0))] if order == 2 else [])
+
+
+def test_steps_count_from_the_start_of_the_curve() -> None:
+    rows = np.zeros((3, 2, 1))
+    rows[0, 1] = 0.5
+    curve = PiecewisePolynomial(np.array([3.0, 4.0, 5.0]), rows)
+    end = State(*(curve.piece_ends(k)[1][-1] for k in range(3)))
+    whole = replace(trajectory(PiecewisePolynomial(curve.breaks - 3.0, rows), end=end), curve=curve)
+    assert [step.time for step in steps_of(whole)] == [1.0]

@@ -7,6 +7,7 @@ import pytest
 from motions import between, limits, trajectory
 from random_jobs import loaded
 
+from trajcli.checks import target
 from trajcli.checks.target import check_targets
 from trajcli.checks.verify import verify
 from trajcli.errors import PlanningError
@@ -101,3 +102,57 @@ def test_a_target_far_outside_of_any_robot_has_no_curve(planner):
     move = {"planner": planner, "to": {"xyz": [1e14, 0, 0], "rpy": [180, 0, 0]}}
     with pytest.raises(PlanningError, match="no robot reaches so far"):
         plan_job(loaded({**far_job(0), "moves": [move]}))
+
+
+def three_moves(wrong: int, by: np.ndarray) -> tuple[Trajectory, list[np.ndarray]]:
+    """Return moves of the arm to three targets, one of which it misses; each begins where it should."""
+    targets = [END + 0.2 * np.sin(np.arange(6) + k) for k in range(4)]
+    moves = [
+        between(targets[k].tolist(), (targets[k + 1] + (by if k == wrong else 0.0)).tolist())
+        for k in range(3)
+    ]
+    return trajectory(*moves), targets[1:]
+
+
+@pytest.mark.parametrize("block", [1, 2, 16_384])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("wrong", range(3))
+def test_every_move_ends_in_its_own_target(wrong: int, side: float, block: int, monkeypatch) -> None:
+    """Whether its target is of joints, a pose, or a pose with joints that are pinned; on a path or not."""
+    monkeypatch.setattr(target, "_BLOCK", block)
+    by = side * 1e-4 * np.array([0.1, 0.0, 0.0, 0.0, 0.0, 1.0])
+    whole, targets = three_moves(wrong, by)
+    poses = [pose_target(forward(ROBOT, each)) for each in targets]
+    of_joints = to_joints(*targets)
+    (found,) = check_targets(whole, of_joints)
+    assert (found.move, found.joint, found.value) == (wrong, "j6", pytest.approx(1e-4))
+    of_poses = [Promise(robot=ROBOT, destination=Destination(None, pose)) for pose in poses]
+    assert {each.move for each in check_targets(whole, of_poses)} == {wrong}
+    loose = (1.0, 1.0)
+    pinned = [
+        Promise(robot=ROBOT, destination=Destination(None, pose, loose, {0: each[0], 5: each[5]}))
+        for pose, each in zip(poses, targets, strict=True)
+    ]
+    (found,) = check_targets(whole, pinned)
+    assert (found.move, found.joint, found.value) == (wrong, "j6", pytest.approx(1e-4))
+    alone = [of_joints[k] if k == wrong else Promise() for k in range(3)]
+    assert len(check_targets(whole, alone)) == 1
+    assert check_targets(whole, [Promise() if k == wrong else of_joints[k] for k in range(3)]) == []
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("off", "found"), [(1.9e-5, 0), (2.1e-5, 1)])
+def test_on_a_path_joints_are_met_as_well_as_the_tool_tells(off: float, found: int, side: float) -> None:
+    mutant, near = END + side * off * np.eye(6)[3], (1e-6, 1e-6)
+    joints = [Promise(destination=Destination(END, tolerance=near))]
+    pins = {3: float(END[3])}
+    pinned = [
+        Promise(robot=ROBOT, destination=Destination(None, partial_target(np.zeros(3)), (9.0, 9.0), pins))
+    ]
+    assert len(check_targets(swing(mutant), joints)) == found
+    assert len(check_targets(swing(mutant), pinned)) == found
+
+
+def test_as_many_promises_as_moves_are_asked_for() -> None:
+    with pytest.raises(ValueError, match="2 promises for 1 moves"):
+        check_targets(swing(), [Promise(), Promise()])

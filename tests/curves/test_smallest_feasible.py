@@ -53,3 +53,13 @@ def test_infinite_stretches_do_not_hide_what_follows(block: int) -> None:
         return np.where((x > 2) & (x < 4), np.inf, 7.0 - x)
 
     assert smallest_feasible(excess, 1.0, 100.0, block=block) == pytest.approx(7.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("block", [1, 64])
+def test_a_dip_that_stays_above_hides_none_behind_it(block: int) -> None:
+    """A near miss at 3, a narrow interval at 20, and nothing else."""
+
+    def excess(x: np.ndarray) -> np.ndarray:
+        return np.minimum(0.05 + np.abs(np.log(x / 3.0)), outside((20.0, 20.0 * (1 + 1e-6)))(x))
+
+    assert smallest_feasible(excess, 1.0, 100.0, block=block) == pytest.approx(20.0, rel=1e-12)

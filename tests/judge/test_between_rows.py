@@ -123,6 +123,34 @@ def test_rounding_adds_to_what_a_change_of_the_law_explains(
     assert found.rounding == pytest.approx(2.5 * rounding * OVER, rel=1e-6)
 
 
+@pytest.mark.parametrize("side", SIDES)
+def test_jerk_that_changed_earlier_explains_little(side: int) -> None:
+    """500 m/s^3 that end before: a tenth of it times T^2 are 3.2e-3 of an excess of 1e-2."""
+    motion = peaked(1, 2, 1e9, side)
+    early = np.minimum(motion.t - (PIECES // 2 - 1) * PERIOD, 0.0)[:, None]
+    for jerk, severity in ((500.0, "error"), (2000.0, "warning")):
+        q, qd = motion.q - side * jerk * early**3 / 6, motion.qd - side * jerk * early**2 / 2
+        (found,) = over(replace(motion, q=q, qd=qd), bare_robot(bounded(1, side, PEAK - OVER)))
+        assert (found.severity, found.kind) == (severity, "velocity")
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("last", [False, True])
+def test_a_change_of_the_law_in_the_first_and_in_the_last_piece_is_one(last: bool, side: int) -> None:
+    """From 10 m/s^2 to none within it, as a cubic has it; all others rest. Its mean is 5."""
+    t, qd = PERIOD * np.arange(7), np.zeros(7)
+    qd[0] = -5.0 * PERIOD
+    q = np.zeros(7)
+    q[0] = 10.0 * PERIOD**2 / 6
+    if last:  # the same backward in time
+        q, qd = q[::-1], -qd[::-1]
+    motion = motion_of(side * q[:, None], side * qd[:, None], t=t)
+    for limit, severity in ((8.0, "warning"), (4.9, "error")):
+        (found,) = over(motion, bare_robot(bounded(2, side, limit)))
+        assert (found.kind, found.severity) == ("acceleration", severity)
+        assert found.value == pytest.approx(side * 10.0)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 def test_rows_that_stand_far_apart_explain_nothing(order: int) -> None:
     for period, severity in ((0.01, "warning"), (0.0101, "error")):

@@ -134,6 +134,21 @@ def test_rates_that_a_row_states(row, order, planted, certainty, side):
     assert found.rounding > 1e-4
 
 
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("planted", "certainty"), PLANTED)
+@pytest.mark.parametrize("back", [False, True])
+def test_numbers_of_few_digits_are_off_by_a_share_of_the_larger_one(back, planted, certainty, side):
+    """From 0 to 1 or back: both are taken to be as rough as the 1, so that their difference is off by twice that."""
+    length, q = T[3] - T[2], np.where((T[2] < T) != back, side * 1.0, 0.0)
+    moves = -side if back else side
+    limits = one_limit("velocity", moves, (1.0 - planted * 2 * OFF) / length)
+    motion = rows(q)
+    motion = replace(motion, resolution=replace(motion.resolution, relative=OFF))
+    found = found_in(motion, bare_robot(limits), "velocity", "linear")
+    assert (found.certainty, found.severity, found.row) == (certainty, "error", 3)
+    assert found.rounding == pytest.approx(2 * OFF / length, rel=1e-6)
+
+
 PEAKS = {
     ("cubic", "velocity"): (1.5, 1),
     ("cubic", "acceleration"): (6.0, 2),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hermite_curves import hermite_pieces
-from recorded_rows import judged, rows_of
+from recorded_rows import judged, part, rows_of
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
@@ -200,6 +200,20 @@ def test_an_irregular_24_hz_file_in_six_decimals_is_taken_as_24_hz() -> None:
     assert found.certainty == "exceeded"
     assert found.value == pytest.approx(peak, rel=1e-7)
     assert judged(motion, limits(velocity=peak * (1 + 1e-7))).verdict == "satisfied"
+
+
+@pytest.mark.parametrize("skipped", [0, 1, 5])
+@pytest.mark.parametrize("begins", [0.0, 1.2345678])
+def test_a_file_may_begin_at_any_row_and_at_any_time(begins: float, skipped: int) -> None:
+    """Rows at 24 Hz in six decimals: as they stand, each interval may be off by a millionth of a second."""
+    motion = rows_of(quintic(), 1 / 24, 1, 9)
+    rows = part(motion, slice(skipped, -1))
+    written = np.round(rows.t + begins, 6)
+    judgement = judged(
+        replace(rows, t=written, resolution=replace(rows.resolution, time=0.5e-6), first_row=1), limits(0.01)
+    )
+    assert judgement.period == pytest.approx(1 / 24, rel=1e-15)
+    assert judgement.verdict == "satisfied"
 
 
 def test_what_rounding_explains_is_within_rounding() -> None:

@@ -10,7 +10,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from trajcli.errors import InputError
-from trajcli.judge.reconstruction import chosen_interpolation, reconstruct
+from trajcli.judge.reconstruction import chosen_interpolation, reconstruct, stated_orders
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 sys.path.append(str(Path(__file__).parent.parent / "streams"))
@@ -93,3 +93,13 @@ def test_what_the_columns_do_not_allow_is_refused() -> None:
         chosen_interpolation("quintic", True, False)
     with pytest.raises(InputError, match="no such interpolation"):
         chosen_interpolation("spline", True, True)
+
+
+def test_a_row_states_what_all_its_joints_state_one_after_the_other() -> None:
+    """A velocity of one joint alone is none of the row, and an acceleration without a velocity does not count."""
+    q, none = np.zeros((6, 2)), np.nan
+    qd = np.array([[0, 0], [none, 0], [0, none], [none, none], [0, 0], [0, 0]])
+    qdd = np.array([[0, 0], [0, 0], [0, 0], [0, 0], [0, none], [none, none]])
+    assert stated_orders(q, qd, qdd).tolist() == [3, 1, 1, 1, 2, 2]
+    assert stated_orders(q, qd, None).tolist() == [2, 1, 1, 1, 2, 2]
+    assert stated_orders(q, None, qdd).tolist() == [1] * 6

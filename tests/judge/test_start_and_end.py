@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from recorded_rows import bare_robot, part
 
+from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import unlimited
+from trajcli.kinematics.robot import ToolLimits, unlimited
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import plan_job
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
@@ -187,3 +188,69 @@ def test_a_single_row_is_a_motion_of_no_duration() -> None:
     low = replace(robot.limits, position=np.array([[-1.0, 1.0], [-0.1, 1.0], [-1.0, 1.0]]))
     (found,) = judge_motion(lambda: [one], Requirements(replace(robot, limits=low))).findings
     assert (found.kind, found.joint, found.value, found.limit) == ("position", "j2", -0.2, -0.1)
+
+
+@pytest.mark.parametrize("blocks", [100, 300, 1000])
+def test_start_and_holes_of_a_long_file_are_where_they_are(blocks: int) -> None:
+    """600 rows, one of which is missing; the first one is beside the start, and no other."""
+    q = np.tile(START, (600, 1))
+    q[0, 1] += 0.01
+    kept = np.arange(600) != 450
+    off = np.zeros(3)
+    t = 0.01 * np.arange(600)
+    rows = RecordedMotion(
+        t[kept], q[kept], None, None, None, None, None, None, Resolution(1e-9, off, off, off), "rows"
+    )
+    states = [State(each, np.zeros(3), np.zeros(3)) for each in (START, START)]
+    robot = bare_robot(unlimited(3))
+    required = Requirements(robot, start=states[0], start_tolerance=TOLERANCE, end=states[1])
+    parts = [part(rows, slice(low, low + blocks)) for low in range(0, 599, blocks)]
+    findings = judge_motion(lambda: parts, required).findings
+    (beside,) = [each for each in findings if each.rule == "state"]
+    assert (beside.kind, beside.row, beside.time, beside.joint) == ("start", 1, 0.0, "j2")
+    (hole,) = [each for each in findings if each.rule == "time"]
+    assert (hole.row, hole.severity) == (451, "warning")
+    assert hole.time == pytest.approx(4.51)
+
+
+@pytest.mark.parametrize("name", ["q", "qd", "qdd"])
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_number_that_is_none_is_refused_with_its_row(wrong: float, name: str) -> None:
+    rows = replace(motion(), qdd=np.zeros((4, 3)))
+    values = getattr(rows, name).copy()
+    values[2, 1] = wrong
+    if name == "q":
+        with pytest.raises(InputError, match="row 3"):
+            judged(replace(rows, **{name: values}))
+    else:  # a column with a hole is none
+        assert judged(replace(rows, **{name: values})).interpolation in ("linear", "cubic")
+
+
+@pytest.mark.parametrize("name", ["position", "velocity", "acceleration", "jerk", "effort"])
+@pytest.mark.parametrize("first", [True, False])
+def test_between_two_moves_the_looser_limits_of_both_are_in_force(first: bool, name: str) -> None:
+    wide, narrow = (
+        replace(unlimited(2), **{name: np.array([[-a, b], [-b, a]])}) for a, b in ((2, 3), (1, 1))
+    )
+    mixed = replace(unlimited(2), **{name: np.array([[-1.0, 3.0], [-3.0, 1.0]])})
+    robots = [bare_robot(each) for each in (wide, narrow)]
+    by_move = dict(enumerate(robots if first else robots[::-1]))
+    between = Requirements(robots[0], by_move=by_move).robot_between(0, 1).limits
+    assert getattr(between, name).tolist() == [[-2, 3], [-3, 2]]
+    by_move[0] = bare_robot(mixed)
+    between = Requirements(robots[0], by_move=by_move).robot_between(0, 1).limits
+    other = getattr(narrow if first else wide, name)
+    both = np.array([[-1.0, 3.0], [-3.0, 1.0]])
+    assert (
+        getattr(between, name).tolist()
+        == np.stack(
+            [np.minimum(both[:, 0], other[:, 0]), np.maximum(both[:, 1], other[:, 1])], axis=1
+        ).tolist()
+    )
+
+
+def test_between_two_moves_the_tool_has_the_looser_limits() -> None:
+    limits = [replace(unlimited(2), tcp=ToolLimits(speed=a, jerk=b)) for a, b in ((0.1, 5.0), (0.2, 4.0))]
+    by_move = dict(enumerate(map(bare_robot, limits)))
+    tcp = Requirements(by_move[0], by_move=by_move).robot_between(0, 1).limits.tcp
+    assert (tcp.speed, tcp.jerk, tcp.acceleration) == (0.2, 5.0, np.inf)

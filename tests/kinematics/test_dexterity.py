@@ -4,7 +4,12 @@ import numpy as np
 import oracle_robots as oracle
 import pytest
 
-from trajcli.kinematics.dexterity import characteristic_length, dexterity, singular_directions
+from trajcli.kinematics.dexterity import (
+    changes_of_sign,
+    characteristic_length,
+    dexterity,
+    singular_directions,
+)
 from trajcli.kinematics.jacobian import jacobian
 
 ARMS = {arm["id"]: oracle.robot_of(arm) for arm in oracle.robots()}
@@ -97,3 +102,25 @@ def test_a_redundant_arm_has_an_idle_motion_and_nothing_blocked():
     lost = singular_directions(PANDA, [0.1, -0.5, 0.3, -2.0, 0.2, 1.7, 0.4])
     assert lost.blocked.shape == (0, 6)
     assert lost.idle.shape == (1, 7)
+
+
+def test_the_length_counts_offsets_in_either_direction():
+    rows = [{"type": "R", "theta": 0.0, "d": d, "a": a, "alpha": 0.0} for a, d in ((0.3, -0.2), (-0.1, 0.4))]
+    assert characteristic_length(oracle.robot_of({"dh": rows, "convention": "std"})) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("determinants", "changes"),
+    [
+        ([1.0, 2.0, 3.0], []),
+        ([1.0, -2.0, 3.0], [1, 2]),
+        ([-1.0, -2.0, 3.0], [2]),
+        ([1.0, 0.0, 3.0], []),
+        ([1.0, 0.0, -3.0], [2]),
+        ([0.0, 0.0, -3.0, 0.0, 0.0, 1.0, 0.0], [5]),
+        ([0.0, 0.0], []),
+        ([], []),
+    ],
+)
+def test_a_sign_changes_where_the_next_one_is_told(determinants, changes):
+    assert changes_of_sign(np.array(determinants)).tolist() == changes

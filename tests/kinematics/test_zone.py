@@ -134,6 +134,7 @@ ONE_TERM = {
         [[0.02, 0.0], [0.0, 0.0], [0.0, 0.2]],
     ),
     "a slide on a turning arm": (arm(ACROSS, SLIDE), [[0.0, 0.0], [0.5, 4.0], [0.0, 0.0]]),
+    "a short slide on a turning arm": (arm(ACROSS, SLIDE), [[0.0, 0.0], [3.0, 0.2], [0.0, 0.0]]),
     "a slide that travels far and turns": (arm(ACROSS, SLIDE), [[0.0, 0.0], [3.0, 20.0], [0.0, 0.01]]),
 }
 
@@ -209,3 +210,39 @@ def test_what_takes_too_many_parts_is_not_proven(monkeypatch):
     around = ZoneAround(arm(LEVER), np.zeros(1), Zone(joints=(0.26,)))
     assert around.largest_share(curve)[0] in (pytest.approx(0.25 / 0.26, rel=0.05), np.inf)
     assert ZoneAround(arm(LEVER), np.zeros(1), Zone(joints=(0.2,))).largest_share(curve)[0] == np.inf
+
+
+@pytest.mark.parametrize("where", ["early", "late", "middle"])
+@pytest.mark.parametrize("kind", ["position", "orientation", "joints"])
+def test_what_ends_near_the_border_and_passes_it_in_between_is_seen(kind, where):
+    """A joint on its way, and back: its ends use much of the zone, and 1.02 of it are used for a short time."""
+    row = {
+        "early": [-2.8, 1.0, 1.02 - 1 / 11.2],  # largest after 1 / 5.6
+        "late": [-2.8, 4.6, 1.02 - 4.6**2 / 11.2],  # after 4.6 / 5.6
+        "middle": [-0.48, 0.48, 0.9],
+    }[where]
+    joint = SLIDE if kind == "position" else LEVER
+    zone = Zone(joints=(1.0,)) if kind == "joints" else Zone(**{kind: 1.0})
+    for side in (1.0, -1.0):
+        curve = PiecewisePolynomial(np.array([0.0, 1.0]), side * np.array(row)[:, None, None])
+        share, when = ZoneAround(arm(joint), np.zeros(1), zone).largest_share(curve)
+        assert share == pytest.approx(1.02, rel=1e-5)
+        assert when == pytest.approx(row[1] / (-2 * row[0]), abs=1e-2)
+        wide = Zone(joints=(1.03,)) if kind == "joints" else Zone(**{kind: 1.03})
+        assert ZoneAround(arm(joint), np.zeros(1), wide).largest_share(curve)[0] <= 1.0
+
+
+def test_each_measure_of_a_zone_counts_alone_and_grows_with_it():
+    around = arm(("revolute", 0.5, 0.0), SLIDE)
+    joints = np.array([[0.2, 0.0], [0.0, 0.3], [-0.2, -0.4]])
+    distance, angle = ZoneAround(around, np.zeros(2), Zone()).offsets(joints)
+    for zone, used in (
+        (Zone(position=0.25), distance / 0.25),
+        (Zone(orientation=0.1), angle / 0.1),
+        (Zone(joints=(0.4, 0.8)), [0.5, 0.375, 0.5]),
+        (Zone(position=9.0, orientation=0.1), np.maximum(angle / 0.1, distance / 9.0)),
+        (Zone(position=9.0, orientation=9.0, joints=(9.0, 0.1)), [0.2 / 9.0, 3.0, 4.0]),
+    ):
+        shares = ZoneAround(around, np.zeros(2), zone).shares(joints)
+        assert shares == pytest.approx(used)
+        assert ZoneAround(around, np.zeros(2), zone.scaled(2.0)).shares(joints) == pytest.approx(shares / 2)

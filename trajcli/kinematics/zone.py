@@ -117,7 +117,8 @@ class ZoneAround:
             at_ends, bound = self._bounds(pieces)
             largest = float(at_ends.max())
             if largest > worst:
-                worst, when = largest, float(pieces.starts[at_ends.argmax()])
+                worst = largest
+                when = min(self._reached(pieces, int(at_ends.argmax()), largest), curve.end)
             open_ended = bound > max(enough, worst) * (1 + ZONE_RELATIVE)
             if not open_ended.any():
                 settled = bound if bound.size else np.zeros(1)
@@ -126,6 +127,12 @@ class ZoneAround:
                 break
             pieces = pieces.halved(open_ended)
         return float("inf"), when
+
+    def _reached(self, pieces: _Intervals, at: int, share: float) -> float:
+        """Return at which end of an interval a share is reached, s."""
+        (at_start,) = self.shares(pieces.coefficients[-1, at : at + 1])
+        later = 0.0 if at_start >= share * (1 - ZONE_RELATIVE) else float(pieces.lengths[at])
+        return float(pieces.starts[at]) + later
 
     def _bounds(self, pieces: _Intervals) -> tuple[Array, Array]:
         """Return the larger share at the ends of intervals, and a bound of it within, each (P,)."""

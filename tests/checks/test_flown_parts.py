@@ -1,0 +1,83 @@
+"""Parts of moves that fly by corners: each is judged by its own limits and its own zone, in its own time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from motions import limits, trajectory
+
+from trajcli.checks.verify import verify
+from trajcli.checks.zones import check_flown
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.findings import Finding
+from trajcli.kinematics.robot import Joint, Limits, Robot
+from trajcli.kinematics.zone import Zone, ZoneAround
+from trajcli.trajectory import MoveInterval, Promise
+
+FREE = limits(2)
+
+
+def bare(bounds: Limits) -> Robot:
+    return Robot("bare", (Joint("j1"), Joint("j2")), bounds, None, np.eye(4), np.eye(4))
+
+
+def steady(*speeds: float) -> PiecewisePolynomial:
+    """Return the second joint at one speed a second, from 0; the first one rests."""
+    rows = np.zeros((2, len(speeds), 2))
+    rows[0, :, 1], rows[1, 1:, 1] = speeds, np.cumsum(speeds)[:-1]
+    return PiecewisePolynomial(np.arange(len(speeds) + 1.0), rows)
+
+
+def part(start: float, end: float, bounds: Limits = FREE, around: ZoneAround | None = None) -> MoveInterval:
+    return MoveInterval(start=start, end=end, robot=bare(bounds), tool=None, around=around)
+
+
+def found(*parts: list[MoveInterval]) -> list[Finding]:
+    """Return what is wrong with the parts of two moves of three seconds each, at speeds of 1, 2 and 3, and of -1 and so on."""
+    whole = trajectory(steady(1.0, 2.0, 3.0), steady(-1.0, -2.0, -3.0))
+    return list(check_flown(whole, [Promise(parts=tuple(each)) for each in parts]))
+
+
+@pytest.mark.parametrize("move", [0, 1])
+@pytest.mark.parametrize("slow", [0, 1, 2])
+def test_each_part_has_its_own_limits(slow: int, move: int) -> None:
+    """All others may be three times as fast as they are; of the other direction there is room."""
+    fastest = slow + 1.0
+    bound = (-0.9 * fastest, 99.0) if move else (-99.0, 0.9 * fastest)
+    parts = [part(k, k + 1, limits(2, velocity=bound if k == slow else 9.0)) for k in range(3)]
+    free = [part(k, k + 1) for k in range(3)]
+    (one,) = found(*([free, parts] if move else [parts, free]))
+    assert (one.kind, one.move, one.joint) == ("velocity", move, "j2")
+    assert [one.value, one.limit] == pytest.approx([fastest * (-1) ** move, bound[0] if move else bound[1]])
+    assert 3 * move + slow <= one.time <= 3 * move + slow + 1
+
+
+def test_parts_of_no_length_and_beyond_the_end_are_none() -> None:
+    tight = limits(2, velocity=0.1)
+    assert found([part(1.0, 1.0, tight)], []) == []
+    (one,) = found([part(2.5, 3.5, limits(2, velocity=2.9))], [])  # not the other move, which follows
+    assert one.value == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(("size", "left"), [(1.0 + 1e-9, False), (1.0 - 1e-5, True)])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_part_that_leaves_its_zone_is_found(joint: int, size: float, left: bool) -> None:
+    """In the second second the second joint goes from 1 to 3, about a corner at 2."""
+    sizes = (size, 9.0) if joint == 0 else (9.0, size)
+    corner = np.array([0.0, 2.0])
+    if joint == 0:
+        corner[0] = 1.0
+    around = ZoneAround(bare(FREE), corner, Zone(joints=sizes))
+    findings = found([part(0, 1), part(1, 2, around=around), part(2, 3)], [])
+    assert [(each.kind, each.move, each.limit) for each in findings] == [("zone", 0, 1.0)] * left
+    for each in findings:
+        assert each.value == pytest.approx(1 / size)
+        assert each.severity == "error"
+
+
+def test_the_verdict_holds_what_is_wrong_with_parts() -> None:
+    whole = trajectory(steady(1.0, 2.0, 3.0))
+    promise = Promise(parts=(part(0, 1), part(1, 2, limits(2, velocity=1.9)), part(2, 3)))
+    verdict = verify(whole, [FREE], [promise])
+    assert not verdict.passed
+    assert ("velocity", 0) in {(each.kind, each.move) for each in verdict.findings}
