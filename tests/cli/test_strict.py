@@ -267,7 +267,15 @@ def kinds_of_events() -> set[str]:
     return kinds
 
 
-REMARKS = {"refined", "bound", "fastest_found", "zone_stops", "branch_taken", "weave_fitted"}
+REMARKS = {
+    "refined",
+    "bound",
+    "fastest_found",
+    "zone_stops",
+    "branch_taken",
+    "weave_fitted",
+    "own_tool_replaced",
+}
 # moves that a limit beyond their planner's holds: the kind is put together from the name of the limit
 WITHIN = {"within_velocity_by_position", "within_tool_limits", "within_effort_limits"}
 KINDS = sorted({kind for kind in kinds_of_events() if not kind.startswith("_")} - REMARKS | WITHIN)

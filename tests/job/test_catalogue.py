@@ -6,6 +6,7 @@ than the catalogue's file; `forward.yaml`, the examples of the lecture notes.
 
 from __future__ import annotations
 
+import json
 import re
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,7 @@ import pytest
 from yaml_files import read_yaml
 
 from trajcli.errors import FileError, InputError
+from trajcli.job.read import job_from_text
 from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
 from trajcli.kinematics.forward import forward
 
@@ -211,3 +213,30 @@ def test_load_robot_from_a_file(tmp_path: Path) -> None:
     assert len(near) == 3
     assert set(near) < set(names)
     assert hint.endswith(f"; `trajcli robots` lists all {len(names)}")
+
+
+OWN_TOOLS = [name for name in catalogue_names() if not np.array_equal(load_robot(name).tool, np.eye(4))]
+
+
+@pytest.mark.parametrize("name", OWN_TOOLS)
+def test_the_tool_that_leads_to_a_flange_is_named_where_another_takes_its_place(name: str) -> None:
+    """A tool that begins with what is named, and holds nothing else, is the arm's own."""
+    own = load_robot(name)
+    job = {
+        "version": 1,
+        "robot": name,
+        "start": {"joints": [0] * len(own.joints)},
+        "tool": {"xyz": [0, 0, 1]},
+    }
+    job |= {"moves": [{"planner": "hold", "duration": 1}]}
+    events = [event for event in job_from_text(json.dumps(job)).events if event.kind == "own_tool_replaced"]
+    (said,) = (event.text() for event in events)
+    xyz, rotvec = (json.loads(text) for text in re.findall(r"\[.*?\]", said))
+    named = job_from_text(json.dumps(job | {"tool": {"xyz": xyz, "rotvec": rotvec}}))
+    assert named.robot.tool == pytest.approx(own.tool, abs=1e-8)
+    assert not job_from_text(json.dumps({key: value for key, value in job.items() if key != "tool"})).events
+
+
+def test_most_arms_end_at_their_flange() -> None:
+    assert {"panda", "fr3", "irb120", "irb1200", "m10ia", "gp7"} <= set(OWN_TOOLS)
+    assert not {"ur5e", "irb140", "kr6_r900"} & set(OWN_TOOLS)

@@ -291,11 +291,32 @@ def _load(document: Document) -> LoadedJob:
         events = [*(Event(kind, message) for kind, message in sheet.concessions), *events]
     source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
     events = [*noted, *events]
+    if job.tool is not None and isinstance(plain["robot"], str):
+        events += _own_tool_replaced(robot)
     loaded = LoadedJob(
         job, name, effective, document, tuple(events), source, context.has_far_angle, context.waits
     )
     _require_no_flaws(loaded)
     return loaded
+
+
+def _own_tool_replaced(robot: Robot) -> list[Event]:
+    """Return the remark that an arm of the catalogue has its flange in the tool that a job replaces."""
+    if np.array_equal(robot.tool, np.eye(4)):
+        return []
+    from trajcli.geometry.rotation import axis_angle_from_matrix
+
+    turn = axis_angle_from_matrix(robot.tool[:3, :3])
+    amounts = {
+        "robot": robot.name,
+        "xyz": Amount(tuple(robot.tool[:3, 3].tolist()), dimension="length"),
+        "rotvec": Amount(tuple((turn.axis * turn.angle).tolist()), dimension="angle"),
+    }
+    message = (
+        "the tool of the job stands in place of that of {robot} itself, which leads from the last row of its "
+        "table to its flange: a tool from there begins with xyz {xyz}, rotvec {rotvec}"
+    )
+    return [Event("own_tool_replaced", message, amounts=amounts)]
 
 
 def _require_no_flaws(loaded: LoadedJob) -> None:

@@ -34,6 +34,7 @@ _REMARKS = (
     "zone_stops",
     "branch_taken",
     "weave_fitted",
+    "own_tool_replaced",
 )  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 _WHOLE = 1e-3  # of a hundredth of a percent: what rounding may put above a proven bound
