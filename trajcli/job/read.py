@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from trajcli.columns import TOOL_COLUMNS
-from trajcli.errors import Amount, InputError, Place, Problem, utf8
+from trajcli.errors import Amount, Amounts, InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
 from trajcli.job.limits import (
     flaws_of_dynamics,
@@ -307,7 +307,7 @@ def _own_tool_replaced(robot: Robot) -> list[Event]:
     from trajcli.geometry.rotation import axis_angle_from_matrix
 
     turn = axis_angle_from_matrix(robot.tool[:3, :3])
-    amounts = {
+    amounts: Amounts = {
         "robot": robot.name,
         "xyz": Amount(tuple(robot.tool[:3, 3].tolist()), dimension="length"),
         "rotvec": Amount(tuple((turn.axis * turn.angle).tolist()), dimension="angle"),
