@@ -27,14 +27,8 @@ if TYPE_CHECKING:
 
 Resolve = Callable[["Target", Array], "Target"]
 WhenOverLimit = Literal["error", "slow"]
-_REMARKS = (
-    "refined",
-    "bound",
-    "fastest_found",
-    "zone_stops",
-    "branch_taken",
-    "weave_fitted",
-    "own_tool_replaced",
+_REMARKS = frozenset(
+    ("refined", "bound", "fastest_found", "zone_stops", "branch_taken", "weave_fitted", "own_tool_replaced")
 )  # kinds of events that are about how a curve was computed, and concede nothing
 _GIVEN = ("duration", "velocity", "acceleration", "deceleration", "timed")  # where they say how long it lasts
 _WHOLE = 1e-3  # of a hundredth of a percent: what rounding may put above a proven bound
