@@ -290,9 +290,7 @@ def _load(document: Document) -> LoadedJob:
     if sheet is not None:
         events = [*(Event(kind, message) for kind, message in sheet.concessions), *events]
     source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
-    events = [*noted, *events]
-    if job.tool is not None and isinstance(plain["robot"], str):
-        events += _own_tool_replaced(robot)
+    events = [*noted, *events, *_own_tool_replaced(job, robot, plain["robot"])]
     loaded = LoadedJob(
         job, name, effective, document, tuple(events), source, context.has_far_angle, context.waits
     )
@@ -300,9 +298,9 @@ def _load(document: Document) -> LoadedJob:
     return loaded
 
 
-def _own_tool_replaced(robot: Robot) -> list[Event]:
+def _own_tool_replaced(job: Job, robot: Robot, named: object) -> list[Event]:
     """Return the remark that an arm of the catalogue has its flange in the tool that a job replaces."""
-    if np.array_equal(robot.tool, np.eye(4)):
+    if job.tool is None or not isinstance(named, str) or np.array_equal(robot.tool, np.eye(4)):
         return []
     from trajcli.geometry.rotation import axis_angle_from_matrix
 
