@@ -13,10 +13,11 @@ import pytest
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
+from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import flown_parts
 from trajcli.planners.flying_by.motion_search import with_paces
 from trajcli.planners.flying_by.row import row_of
-from trajcli.planners.flying_by.search import PathPart, begin_search
+from trajcli.planners.flying_by.search import begin_search
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
 from trajcli.planning.plan import plan_job
 

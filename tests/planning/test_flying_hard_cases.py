@@ -14,7 +14,7 @@ from trajcli.checks.verify import verify
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.planners.fastest_through_points.state_times import fastest_durations
-from trajcli.planners.flying_by import search
+from trajcli.planners.flying_by import chain_parts
 from trajcli.planning.plan import Plan, plan_job
 
 LIMITS = {"velocity": 3, "acceleration": 8, "jerk": 60}
@@ -213,7 +213,15 @@ def test_many_zones_are_flown_by(count):
     assert plan.flyby.duration < 0.9 * plan.flyby.stopping
 
 
-@pytest.mark.skipif(QUICK, reason="20 s")
+def test_where_nothing_is_far_the_arm_turns_back_at_once_with_all_its_acceleration():
+    """Of two moves, there and back, a zone takes all but 0.03 rad of a joint; from rest to rest that is 0.252 s."""
+    plan = planned(to(0.9, 1.25), to(0.3, 1.2), zone=0.5)
+    (zone,) = plan.flyby.zones
+    assert zone.left - zone.entered < 0.05
+    assert plan.flyby.duration < 0.437
+
+
+@pytest.mark.skipif(QUICK, reason="8 s")
 def test_a_search_takes_little_more_for_each_of_fifty_moves_than_for_each_of_twelve(monkeypatch):
     """Counted, not timed: what ruckig is asked for."""
     asked = [0]
@@ -222,10 +230,10 @@ def test_a_search_takes_little_more_for_each_of_fifty_moves_than_for_each_of_twe
         asked[0] += steps.size
         return fastest_durations(steps, pairs, limits)
 
-    monkeypatch.setattr(search, "fastest_durations", counting)
+    monkeypatch.setattr(chain_parts, "fastest_durations", counting)
     each = []
     for count in (12, 50):
         asked[0] = 0
         planned(*program(count))
         each.append(asked[0] / count)
-    assert each[1] < 1.6 * each[0]
+    assert each[1] < 1.25 * each[0]

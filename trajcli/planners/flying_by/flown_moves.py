@@ -27,7 +27,7 @@ from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
 from trajcli.trajectory import MoveInterval, ViaPoints
 
 _SAMPLES = 513  # of a zone, at which its distances are looked at
-_AT_ONCE = 16  # of them whose distances from the path are computed together
+_EACH = 8  # each of how many of them is looked at first for distances from the path
 _KEPT = 16  # intervals of the path to its corner, and from there, that pictures show
 _DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
 _OF_PATHS = ("merged", "moved_center", "shrunk", "jerk_limit_both_ways")  # events, not of a law
@@ -183,16 +183,19 @@ def _programmed(courses: Sequence[Course], borders: tuple[float, float]) -> Arra
 
 
 def _off_path(robot: Robot, joints: Array, programmed: Array) -> float:
-    """Return the largest distance of the tool from the programmed path, m."""
+    """Return the largest distance of the tool from the programmed path, m.
+
+    Of the rows of joints in time some are looked at, and those about the farthest one.
+    """
     path = forward(robot, programmed)[:, :3, 3]
     here = forward(robot, joints)[:, :3, 3]
     starts, steps = path[:-1], np.diff(path, axis=0)
     squares = np.maximum(np.square(steps).sum(axis=1), np.finfo(np.float64).tiny)
-    nearest = [
-        _squares_to(here[low : low + _AT_ONCE, None], starts, steps, squares)
-        for low in range(0, len(here), _AT_ONCE)
-    ]
-    return math.sqrt(max(float(each.max()) for each in nearest))
+    coarse = _squares_to(here[::_EACH, None], starts, steps, squares)
+    middle = _EACH * int(coarse.argmax())
+    about = here[max(middle - _EACH, 0) : middle + _EACH + 1, None]
+    fine = _squares_to(about, starts, steps, squares)
+    return math.sqrt(max(float(coarse.max()), float(fine.max())))
 
 
 def _squares_to(positions: Array, starts: Array, steps: Array, squares: Array) -> Array:

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from trajcli.curves.extrema import peaks
 from trajcli.curves.hermite import hermite_coefficients
 from trajcli.curves.operations import along_line, cut, merge_breaks, scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
@@ -21,13 +22,14 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.limits.parts import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
+from trajcli.planners.flying_by.chain_parts import ChainPart, PathPart, joint_rates
 from trajcli.planners.flying_by.row import ChainRow, joint_bounds, slowed
-from trajcli.planners.flying_by.search import ChainPart, PathPart, joint_rates
 from trajcli.planners.ruckig import BoundaryProblem, fastest, together
 from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
 _HOPELESS = 1.3  # times a limit after the first steps of a law between states
+_LONGER = (2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
 _SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
 _BACKWARD = 1e-9  # of the length: a law that goes back by less stands still
 
@@ -203,7 +205,13 @@ def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> Flow
     rests = [_hardly_moves(problem) for problem in problems]
     rests = [False] * len(rests) if all(rests) else rests  # the zone itself is next to nothing
     moving = [problem for problem, rest in zip(problems, rests, strict=True) if not rest]
-    profiles = together(moving, [fastest(problem) for problem in moving])
+    try:
+        profiles = together(moving, [fastest(problem) for problem in moving])
+    except PlanningError:
+        slow = _slow_quintics(problems)
+        if slow is None:
+            raise
+        return FlownPart(merge_breaks(slow))
     duration = max(profile.duration for profile in profiles)
     others = iter(profiles)
     curves = [
@@ -211,6 +219,24 @@ def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> Flow
         for problem, rest in zip(problems, rests, strict=True)
     ]
     return FlownPart(merge_breaks(curves))
+
+
+def _slow_quintics(problems: Sequence[BoundaryProblem]) -> list[PiecewisePolynomial] | None:
+    """Return quintics of one duration, somewhat longer than needed, that keep all bounds; None without any.
+
+    They lead from rest to next to rest, where numbers are too small for phases of constant jerk.
+    """
+    longest = max(fastest(problem).duration for problem in problems)
+    for longer in _LONGER:
+        curves = [_quintic(problem, longer * longest) for problem in problems]
+        extremes = [peaks(curve, (1, 2, 3)) for curve in curves]
+        if all(
+            low <= float(extreme.low[0]) and float(extreme.high[0]) <= high
+            for problem, orders in zip(problems, extremes, strict=True)
+            for (low, high), extreme in zip(problem.bounds.tolist(), orders, strict=True)
+        ):
+            return curves
+    return None
 
 
 def _hardly_moves(problem: BoundaryProblem) -> bool:

@@ -19,6 +19,7 @@ from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.planners.flying_by.between_stops import FlyByChain
+from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import (
     FlownPart,
     NoLawError,
@@ -27,7 +28,7 @@ from trajcli.planners.flying_by.flown_parts import (
     zone_motions,
 )
 from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
-from trajcli.planners.flying_by.search import FoundStates, PathPart, begin_search
+from trajcli.planners.flying_by.search import FoundStates, begin_search
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
 
 _MOST = 16  # searches
@@ -250,7 +251,7 @@ def _found(row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twic
     if forward.best.duration <= other.best.duration:
         return forward.until().found()
     found = other.until().found()
-    return FoundStates(found.states[::-1] * mirror, found.duration)
+    return FoundStates(found.states[::-1] * mirror, found.durations[::-1])
 
 
 def _changes(chain: FlyByChain, row: ChainRow, found: FoundStates, parts: Sequence[FlownPart]) -> Array:

@@ -12,7 +12,7 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.planners.course import Course, law_bounds
 from trajcli.planners.flying_by.between_stops import CornerZone, FlyByChain
-from trajcli.planners.flying_by.search import BorderNode, BoundsAbout, ChainPart, PathPart, ZonePart
+from trajcli.planners.flying_by.chain_parts import BorderNode, BoundsAbout, ChainPart, PathPart, ZonePart
 
 
 @frozen
