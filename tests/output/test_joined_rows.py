@@ -113,6 +113,15 @@ def test_a_named_cure_cures() -> None:
     assert report.worst.value / report.worst.limit == pytest.approx(factor_by_scipy(plan), rel=2e-3)
 
 
+def test_the_columns_that_join_knots_to_the_motion_are_named() -> None:
+    """By straight lines between knots it is far from planned: cubics, which blends are, keep all."""
+    sets = ("output.rows=knots", "output.columns=[t, q]")
+    plan = planned("blends_ur5e", *sets)
+    shown, _ = with_event(plan, joined_rows(plan, grid_of(plan), FORMATS["csv"]), FORMATS["csv"])
+    assert '`--set "output.columns=[t, q, qd]"` keeps every limit' in shown.events[-1].message
+    assert factor_by_scipy(planned("blends_ur5e", sets[0], "output.columns=[t, q, qd]")) < 1 + 1e-6
+
+
 def test_plan_and_check_say_the_same(tmp_path: Path) -> None:
     plan, file = planned("ur5e_pick"), tmp_path / "rows.csv"
     trajcli.plan(EXAMPLES / "ur5e_pick.yaml").save(file)

@@ -154,25 +154,29 @@ def rate_that_keeps(rows: JoinedRows) -> float | None:
     return None
 
 
+def _others_at_knots(rows: JoinedRows, content: str) -> Iterator[OtherRows]:
+    """Yield rows at the knots of the same motion, also with columns that join them in another way."""
+    from trajcli.knots import has_knots
+
+    there = rows.plan.loaded.job.output.rows == "knots"
+    if not (there or isinstance(rows.grid, UniformGrid)) or not has_knots(rows.plan.trajectory):
+        return
+    output = {} if there else {"rows": "knots"}
+    if "q" in rows.groups and not there:
+        yield _at_knots(rows, rows.groups, output)
+    for columns in (_STATES, _WITHOUT_ACCELERATION) if content == "rows" else ():
+        if "q" not in rows.groups or replace(rows, groups=columns).interpolation != rows.interpolation:
+            yield _at_knots(rows, columns, {**output, "columns": columns})
+
+
 def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
     """Yield other rows of the same motion, the simplest first."""
     full = None if {*_STATES} <= {*rows.groups} else _STATES
     if "q" not in rows.groups and full is None:
         return  # rows of the tool alone
-    from trajcli.knots import has_knots
-
     content = "rows" if form is None else form.content
-    if isinstance(rows.grid, UniformGrid) and has_knots(rows.plan.trajectory):
-        if "q" in rows.groups:
-            yield _at_knots(rows, rows.groups, {"rows": "knots"})
-        if content == "rows":
-            for columns in (_STATES, _WITHOUT_ACCELERATION):
-                if (
-                    "q" not in rows.groups
-                    or replace(rows, groups=columns).interpolation != rows.interpolation
-                ):
-                    yield _at_knots(rows, columns, {"rows": "knots", "columns": columns})
-    if full is not None and content == "rows":
+    yield from _others_at_knots(rows, content)
+    if full is not None and content == "rows" and rows.plan.loaded.job.output.rows != "knots":
         yield OtherRows(replace(rows, groups=full), {"columns": full})
     if content != "log" and "qdd" in rows.groups:
         shorter = replace(rows, groups=_WITHOUT_ACCELERATION)
