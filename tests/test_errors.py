@@ -165,7 +165,7 @@ def words_of(job: str) -> list[str]:
 
 @pytest.mark.parametrize(
     ("case", "name"),
-    [(case, name) for case in JOBS for name in (few(AWKWARD, 2 if case in SLOW else 4))],
+    [(case, name) for case in JOBS for name in (few(AWKWARD, 1 if case in SLOW else 3))],
 )
 def test_names_of_joints_and_robots_are_text(case: str, name: str) -> None:
     expected = [renamed(text, name) for text in plain_words(case)]

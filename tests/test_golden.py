@@ -24,6 +24,9 @@ from trajcli.streams.table import read_csv
 
 PATHS = sorted(EXAMPLES.glob("*.yaml"))
 IDS = [path.stem for path in PATHS]
+LONG = ("signals", "two_tools")
+"""Planned over seconds."""
+EACH = [pytest.param(path, id=path.stem, marks=[pytest.mark.full] * (path.stem in LONG)) for path in PATHS]
 SEARCHED = ("waypoints",)
 """Searched for by linear algebra, which another NumPy rounds in another way: another motion as fast may be found."""
 NUMPY = "2.4."
@@ -40,7 +43,7 @@ def test_there_is_one_golden_file_for_each_example() -> None:
     assert {golden_file(path) for path in PATHS} == set(GOLDEN.glob("*.csv"))
 
 
-@pytest.mark.parametrize("example", PATHS, ids=IDS)
+@pytest.mark.parametrize("example", EACH)
 def test_rows_are_the_golden_ones(example: Path, tmp_path: Path) -> None:
     now = tmp_path / "now.csv"
     now.write_bytes(rows_of(planned_example(example.stem)))
@@ -54,7 +57,7 @@ def test_rows_are_the_golden_ones(example: Path, tmp_path: Path) -> None:
     assert now.read_bytes() == golden.read_bytes()
 
 
-@pytest.mark.parametrize("example", PATHS, ids=IDS)
+@pytest.mark.parametrize("example", EACH)
 def test_every_example_verifies_and_reports(example: Path) -> None:
     assert report_of(planned_example(example.stem)).verdict == "verified"
 
@@ -83,7 +86,7 @@ def _highest_power_first(
         out += row * local**power
 
 
-@pytest.mark.parametrize("example", PATHS, ids=IDS)
+@pytest.mark.parametrize("example", EACH)
 @pytest.mark.parametrize("order", [_by_horner, _lowest_power_first, _highest_power_first])
 def test_the_order_of_evaluation_does_not_show(
     example: Path, order: Callable[..., None], monkeypatch: pytest.MonkeyPatch
@@ -101,7 +104,7 @@ def test_the_order_of_evaluation_does_not_show(
     assert sum(calls) >= rows.count(b"\n") - 1
 
 
-@pytest.mark.parametrize("example", few(PATHS, 10), ids=few(IDS, 10))
+@pytest.mark.parametrize("example", few(PATHS, 4), ids=few(IDS, 4))
 def test_no_float_is_added_by_the_function_that_another_python_rounds_otherwise(
     example: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -24,6 +24,9 @@ RULES = [
     *safety_rules.RULES,
     *word_rules.RULES,
 ]
+LONG = ("no_code_is_dead",)
+"""Rules that read every file in several ways."""
+EACH = [pytest.param(rule, id=rule.name, marks=[pytest.mark.full] * (rule.name in LONG)) for rule in RULES]
 PLANTED = [
     pytest.param(rule, planted, id=f"{rule.name}-{number}")
     for rule in RULES
@@ -31,7 +34,7 @@ PLANTED = [
 ]
 
 
-@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+@pytest.mark.parametrize("rule", EACH)
 def test_the_house_keeps_the_rule(rule: Rule) -> None:
     wrong = rule.offences(the_sources(), rule.exceptions)
     assert not wrong, "\n" + "\n".join(f"{where}: {text}" for where, text in wrong)

@@ -14,6 +14,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 from running import COMMAND, ENDLESS, EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, SLOWED, call, run
+from tiers import few
 
 Capture = pytest.CaptureFixture[str]
 ROBOT = "joints: [{velocity: 2}]\n"
@@ -302,7 +303,7 @@ def begin(*options: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("number", "code"), few([(signal.SIGINT, 130), (signal.SIGTERM, 143)], 1))
 @pytest.mark.usefixtures("folder")
 def test_an_interrupt_leaves_no_half_file_and_no_process(number: int, code: int) -> None:
     process = begin()
@@ -368,6 +369,7 @@ def test_a_closed_pipe_is_141_and_ends_all() -> None:
     assert parts() == []
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("folder")
 def test_progress_on_a_terminal_only() -> None:
     pty = pytest.importorskip("pty")

@@ -182,6 +182,7 @@ def test_another_start_is_found(capfd: pytest.CaptureFixture[str], planned: Path
     assert view(capfd, planned / "rows.csv", *words)[0] == 0
 
 
+@pytest.mark.full
 def test_the_speed_of_the_tool_is_judged(
     capfd: pytest.CaptureFixture[str], planned: Path, tmp_path: Path
 ) -> None:

@@ -199,6 +199,7 @@ def test_derivatives_of_a_closed_form(capfd: Capture) -> None:
     assert f"qdd1(t) = {move['closed_form_derivatives']['j1'][1]}" in out
 
 
+@pytest.mark.full
 def test_the_law_along_a_path_has_derivatives(capfd: Capture) -> None:
     out = call(capfd, "explain", EXAMPLES / "line.yaml", "--derivatives").out
     assert "sd(t) = " in out
@@ -293,6 +294,7 @@ def test_more_pieces_than_a_person_reads_are_counted(capfd: Capture, job: Path) 
     assert len(move_of(capfd, job)["polynomials"]["j1"]) == pieces
 
 
+@pytest.mark.full
 def test_fits_of_high_degree_are_not_printed(capfd: Capture) -> None:
     code, out, _ = call(capfd, "explain", str(EXAMPLES / "signals.yaml"))
     assert code == 0

@@ -116,6 +116,7 @@ def test_control_characters_of_messages_are_shown_as_escapes() -> None:
     assert not re.search(r"[\x00-\x09\x0b-\x1f]", text)
 
 
+@pytest.mark.full
 @settings(deadline=None, max_examples=200)
 @given(st.text(max_size=250), st.integers(1, 260), st.integers(1, 260), st.text(max_size=120))
 def test_any_place_makes_a_frame(source: str, column: int, length: int, text: str) -> None:

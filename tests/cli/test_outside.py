@@ -41,6 +41,7 @@ def rows(folder: Path, capfd: pytest.CaptureFixture[str]) -> str:
     return call(capfd, "plan", folder / "job.yaml", "-q").out
 
 
+@pytest.mark.full
 def test_rows_hold_no_summary_where_standard_error_is_closed(folder: Path, rows: str) -> None:
     for line in ("trajcli plan job.yaml 2>&-", "trajcli plan job.yaml <&- 2>&-"):
         done = shell(line, folder)
@@ -102,7 +103,7 @@ def started(folder: Path, *words: str) -> subprocess.Popen[bytes]:
     return process
 
 
-@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize(("number", "code"), few(SIGNALS, 1))
 def test_a_signal_leaves_no_half_file(folder: Path, number: signal.Signals, code: int) -> None:
     (folder / "a.csv").write_text("old")
     before = sorted(path.name for path in folder.iterdir())
@@ -114,7 +115,7 @@ def test_a_signal_leaves_no_half_file(folder: Path, number: signal.Signals, code
     assert (folder / "a.csv").read_text() == "old"
 
 
-@pytest.mark.parametrize(("number", "code"), SIGNALS)
+@pytest.mark.parametrize(("number", "code"), few(SIGNALS, 1))
 def test_a_signal_ends_a_command_whose_reader_has_stopped(
     folder: Path, number: signal.Signals, code: int
 ) -> None:
@@ -133,6 +134,7 @@ def test_a_signal_ends_a_command_whose_reader_has_stopped(
     assert err == b""
 
 
+@pytest.mark.full
 def test_a_hangup_that_is_ignored_stays_ignored(folder: Path) -> None:
     """As `nohup` asks for."""
     (folder / "long.yaml").write_text(ENDLESS.replace("1e6", "1e5"))

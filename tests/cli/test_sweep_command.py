@@ -110,6 +110,7 @@ def test_a_missing_job_is_4(job: Path, capfd: Capture) -> None:
     assert (code, err.count("error:")) == (4, 1)
 
 
+@pytest.mark.full
 def test_a_killed_sweep_goes_on_where_it_was(job: Path, capfd: Capture) -> None:
     varied = ("--vary", "moves.0.duration=1..2:150", "-q")
     words = [*COMMAND, "sweep", str(job), *varied, "-j", "1", "-o", "table.csv"]

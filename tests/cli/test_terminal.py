@@ -178,6 +178,7 @@ def test_a_sweep_counts_and_its_table_fits(tmp_path: Path) -> None:
     assert max(map(len, lines)) <= 80
 
 
+@pytest.mark.full
 def test_payload_says_which_trial_runs(capfd: pytest.CaptureFixture[str]) -> None:
     said: list[str] = []
     with listening(said.append):

@@ -84,7 +84,7 @@ def over_when_stretched(made: ForConsumer, first: Plan, periods: int, rate: floa
     return largest_share(slower, UniformGrid(whole.duration * factor, rate), 1e-4) > 1 + WITHIN
 
 
-@pytest.mark.parametrize("number", few((60, 101, 10, 135), 2))
+@pytest.mark.parametrize("number", few((10, 60, 101, 135), 1))
 def test_no_smaller_stretch_of_the_whole_does_it(number: int) -> None:
     """A motion of blends lasted 16 % longer within tighter limits, where 1.8 % as a whole do."""
     made = delivered(number, "ur-servoj")

@@ -141,7 +141,7 @@ def numbers(user: Any, si: Any, path: str = "") -> Iterator[tuple[str, float, fl
                 yield each
 
 
-@pytest.mark.parametrize("name", few(list(JOBS), 1))
+@pytest.mark.parametrize("name", few(list(JOBS)[::-1], 1))
 def test_every_number_is_in_the_units_of_the_job(name: str) -> None:
     user, si = both(JOBS[name])
     assert user["units"] == {"angle": "deg", "length": "mm", "time": "s"}

@@ -45,8 +45,8 @@ def made_for(name: str, profile: str) -> ForConsumer:
             ("ur5e_pick", "ros-jtc", 1.0),  # at its knots
             ("ur5e_pick", "ur-servoj", 1.001),  # with its breaks on rows
             ("ur5e_pick", "ur-passthrough", 1.005),
-            ("time_optimal", "ros-jtc", 1.001),  # at its knots, without accelerations
             ("time_optimal", "ur-servoj", 1.2),  # quintics pass a step of acceleration 1.65 times
+            ("time_optimal", "ros-jtc", 1.001),  # at its knots, without accelerations
             ("moveit_limits", "ros-jtc", 1.0),
             ("sync", "ros-jtc", 1.11),  # at 2 Hz, with ramps that no row can show
             ("scara_pick", "ros-jtc", 1.0),

@@ -9,6 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.zone import ZoneAround
@@ -44,7 +45,7 @@ def chain_with(moves: str) -> tuple[FlyByChain, float]:
     return chain_of(courses, [around], (rest, rest), [1.0]), plan.trajectory.duration
 
 
-@pytest.mark.parametrize("pace", [1.0, 0.6])
+@pytest.mark.parametrize("pace", few([0.6, 1.0], 1))
 @pytest.mark.parametrize("moves", MOVES)
 def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace):
     """Even at a lower pace in its zone than elsewhere its motion is one: then it takes that much longer."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tiers import QUICK
+from tiers import QUICK, few
 
 from trajcli.checks.verify import verify
 from trajcli.errors import InputError, PlanningError
@@ -139,7 +139,7 @@ POLYLINE = {
 }
 
 
-@pytest.mark.parametrize("limits", [LIMITS, JERKLESS], ids=["jerk", "no jerk"])
+@pytest.mark.parametrize("limits", few([JERKLESS, LIMITS], 1), ids=few(["no jerk", "jerk"], 1))
 def test_a_move_that_stops_at_corners_of_its_own_is_flown_by_at_its_ends(limits):
     plan = planned(to(0.6, 1.3), POLYLINE, to(1.2, 2.0), limits=limits)
     assert [zone.move for zone in plan.flyby.zones] == [0, 1]
@@ -150,7 +150,9 @@ def test_a_move_that_stops_at_corners_of_its_own_is_flown_by_at_its_ends(limits)
     np.testing.assert_allclose(state, [[0.8, 1.5], [0, 0]], atol=1e-7)
 
 
-@pytest.mark.parametrize("stop", [{"corner": "stop"}, {"radius": 0.02}], ids=["corner", "radius"])
+@pytest.mark.parametrize(
+    "stop", few([{"corner": "stop"}, {"radius": 0.02}], 1), ids=few(["corner", "radius"], 1)
+)
 def test_a_path_that_stops_at_its_corner_is_flown_by_at_its_ends(stop):
     own = {"radius": 0} if "radius" in stop else {}
     segments = [{"line": {"xyz": [0.25, 0.4, 0]}, **own}, {"line": {"xyz": [0.2, 0.35, 0]}}]

@@ -62,6 +62,7 @@ def _peak(moves: int) -> int:
         tracemalloc.stop()
 
 
+@pytest.mark.full
 def test_a_million_moves_are_planned_within_two_gibibytes(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in (
         "knots._BLOCK",

@@ -98,6 +98,7 @@ moves:
 """
 
 
+@pytest.mark.full
 def test_where_each_mass_has_its_own_motion_few_are_tried(monkeypatch) -> None:  # type: ignore[no-untyped-def]
     loaded, planned = job_from_text(LIFTING), list[int]()
     known = planned_move.plan_move_within
@@ -143,6 +144,7 @@ def test_what_binds_is_said_with_its_place() -> None:
     assert found.move == int(np.searchsorted([2, 3.5], t[row], "right"))
 
 
+@pytest.mark.full
 def test_of_several_payloads_one_or_all() -> None:
     two = CARRYING.replace("MASS", "1").replace(LAST, "") + "  - {attach: {mass: 2}}\n"
     two += "  - {planner: quintic, to: {joints: [0, 0]}, duration: 4}\n"
@@ -226,6 +228,7 @@ def test_gravity_that_is_too_much_without_any_payload_is_the_error_of_the_job() 
     assert not isinstance(refused.value, InputError)
 
 
+@pytest.mark.full
 def test_a_duration_that_binds_is_the_cause(tmp_path, capsys, monkeypatch) -> None:  # type: ignore[no-untyped-def]
     quickest = "{planner: time_optimal, through: [{joints: [60, 50]}, {joints: [20, 90]}], duration: 1.6}"
     text = CARRYING.replace("{planner: quintic, to: {joints: [20, 90]}, duration: 1.5}", quickest)

@@ -115,6 +115,7 @@ def test_a_limit_is_broken_from_one_billionth_on(
         assert finding.value == pytest.approx(max(at, after) if upper else min(at, after), rel=1e-9)
 
 
+@pytest.mark.full
 @settings(max_examples=50, deadline=None)
 @given(
     seed=SEEDS,

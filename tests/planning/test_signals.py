@@ -148,6 +148,7 @@ def test_a_log_has_a_topic_for_each_signal(tmp_path: Path) -> None:
     assert found == [(k, t, "std_msgs/msg/Float64", v) for k, (t, v) in enumerate(values)]
 
 
+@pytest.mark.full
 def test_rows_whose_signal_is_another_are_none_of_the_plan(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

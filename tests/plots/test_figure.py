@@ -295,6 +295,7 @@ print("matplotlib.pyplot" in sys.modules)
 """
 
 
+@pytest.mark.full
 def test_bytes_are_the_same_in_every_process_and_whatever_settings_the_user_has(
     tmp_path: Path, example: Example
 ) -> None:

@@ -200,6 +200,7 @@ def test_findings_are_marked_at_their_time_and_value() -> None:
     assert "NOT VERIFIED, 1 finding" in picture.title
 
 
+@pytest.mark.full
 def test_points_of_a_path_have_their_names(example: Example) -> None:
     views = picture_of(example("flying_cell"), quantities=["path"]).views
     assert views is not None

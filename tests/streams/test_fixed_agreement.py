@@ -32,6 +32,7 @@ def test_columns_of_whole_numbers_agree():
     assert not FixedLayout(rows, (1, 4)).agrees(text.replace(b",140\n", b",140,"))
 
 
+@pytest.mark.full
 def test_no_changed_byte_agrees():
     rows = np.array([[0.0, -12.5, 3.25, 1234.0], [0.001, 99.125, -9999.5, 7.0], [-0.25, 1e-9, 2.0, -3.0]])
     text = encode_fixed(rows)

@@ -206,6 +206,7 @@ def test_packages_are_found_where_ros_looks(tmp_path: Path, monkeypatch: pytest.
         assert found_file(name, urdf) is None
 
 
+@pytest.mark.full
 def test_meshes_keep_to_their_budget_and_to_their_shape(arm: Path) -> None:
     angles = np.linspace(-np.pi / 2, np.pi / 2, 200)
     turns = np.linspace(0, 2 * np.pi, 401)

@@ -201,6 +201,7 @@ moves:
 """
 
 
+@pytest.mark.full
 def test_labels_stand_in_reports_explanations_and_errors(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

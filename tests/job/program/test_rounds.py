@@ -260,6 +260,7 @@ def _calls(rows: int) -> int:
     return calls_of(lambda: planned(text))
 
 
+@pytest.mark.full
 def test_calls_grow_as_the_places_of_a_pallet() -> None:
     _calls(2)  # what is made once
     few, more, many = (_calls(rows) for rows in (3, 5, 11))

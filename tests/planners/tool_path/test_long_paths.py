@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tiers import few
 from tool_jobs import DOWN, plan, poses_of, times_of
 
 from trajcli.curves.hermite_fit import FitError, fit, most_pieces
@@ -34,6 +35,7 @@ def distances(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return np.linalg.norm(apart - part[..., None] * along, axis=-1).min(axis=1)
 
 
+@pytest.mark.full
 def test_a_path_of_a_hundred_rounded_segments_is_planned():
     made = zigzag(100, radius=0.001, law={"shape": "trapezoid", "speed": 0.02, "acceleration": 0.1})
     points = poses_of(made, times_of(made, 2001))[:, :3, 3]
@@ -49,7 +51,7 @@ def test_pieces_are_allowed_by_the_breaks_of_a_path():
     assert most_pieces(np.arange(3001.0)) > 100 * 3000
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("side", few(["left", "right"], 1))
 def test_overlapping_segments_add_up_as_the_textbook_says(side):
     """Siciliano, eq. 4.43: p0 plus all that the segments have gone, those done and those not begun as well."""
     rng = np.random.default_rng(3)

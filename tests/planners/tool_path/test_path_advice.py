@@ -76,6 +76,7 @@ def kinds_of(plan: Plan) -> list[str]:
     return [event.kind for event in plan.events]
 
 
+@pytest.mark.full
 def test_a_path_that_turns_back_stops_there_and_says_so() -> None:
     third = f"{BACK}\n      - {{line: {{xyz: [450, 120, 200]}}}}"
     ahead = "200, 200]}}\n      - {line: {xyz: [400, 120"
@@ -86,6 +87,7 @@ def test_a_path_that_turns_back_stops_there_and_says_so() -> None:
     assert np.array_equal(plan.trajectory.curve.coefficients, by_hand.trajectory.curve.coefficients)
 
 
+@pytest.mark.full
 def test_doubled_points_are_one() -> None:
     twice = "{line: {xyz: [400, 200, 200]}}"
     single, doubled = planned(TURN), planned(f"{twice}\n      - {twice}\n      - {TURN}\n      - {TURN}")

@@ -161,6 +161,7 @@ def test_pictures_show_limits_that_step():
     assert np.isnan(PlannedMotion(made).tool_limit(angular=True)[:, 1]).all()
 
 
+@pytest.mark.full
 def test_a_path_that_is_flown_by_keeps_the_speeds_of_its_segments():
     places = [[0.3, 0.25, 0.3], [0.4, 0.25, 0.3]]
     segments = [

@@ -177,6 +177,7 @@ def test_wrong_input_is_one_clear_error(move, message, code):
     assert error.exit_code == code
 
 
+@pytest.mark.full
 def test_a_moving_start_is_refused():
     run = {"planner": "jerk_limited", "to": {"joints": [0.1, -1.5, 1.5, 0, 1.5, 0], "velocity": 0.1}}
     limits = {**LIMITS, "jerk": 500}

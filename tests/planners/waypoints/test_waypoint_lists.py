@@ -40,6 +40,7 @@ def test_one_joint_against_brute_force(case):
     assert judged(case, planned(case)) <= 1.001
 
 
+@pytest.mark.full
 def test_some_random_lists():
     ratios = [judged(case, planned(case)) for case in (LISTS["waypoints"][k] for k in FEW.tolist())]
     assert np.quantile(ratios, 0.9) <= WANTED

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import few
 from waypoint_problems import job_of, most_used, stopping
 
 import trajcli
@@ -73,6 +74,7 @@ def test_faster_limits_scale_the_time():
     assert ratio == pytest.approx(3, rel=1e-3)
 
 
+@pytest.mark.full
 def test_more_starts_are_not_slower():
     durations = [plan_of(starts=starts).trajectory.duration for starts in (1, 2, 4)]
     assert durations[0] >= durations[1] * (1 - 1e-9) >= durations[2] * (1 - 2e-9)
@@ -129,6 +131,7 @@ def test_two_points_are_a_move_from_state_to_state():
     )
 
 
+@pytest.mark.full
 def test_doubled_points_count_once_and_leave_their_duration_to_the_next():
     doubled = {**CASE, "waypoints": [POINTS[0], POINTS[0], POINTS[1], POINTS[1], *POINTS[2:], POINTS[3]]}
     plan = plan_of(doubled, minimum_durations=[0.5, 0, 1.25, 0, 0, 1.5])
@@ -165,7 +168,7 @@ def test_joints_that_do_not_move_stand_still_and_need_no_limits():
         trajcli.plan({**job, "robot": robot})
 
 
-@pytest.mark.parametrize("margin", [0.02, 0.0])
+@pytest.mark.parametrize("margin", few([0.02, 0.0], 1))
 def test_position_limits_are_kept(margin):
     q = np.array(POINTS)
     bounds = [[low - margin, high + margin] for low, high in zip(q.min(0), q.max(0), strict=True)]

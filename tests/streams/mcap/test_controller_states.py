@@ -126,6 +126,7 @@ def test_a_field_of_another_type_or_format_is_refused(pick_log, tmp_path):
         open_motion(tmp_path / "a.csv", topic="/x")
 
 
+@pytest.mark.full
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
     monkeypatch.setattr("trajcli.streams.recorded_motion._KEPT", 0)
     peaks = []

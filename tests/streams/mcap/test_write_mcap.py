@@ -167,6 +167,7 @@ def test_the_tool_path_is_that_of_the_tool(pick: Plan, topics) -> None:
         assert np.abs(turned - expected[:3, :3]).max() <= 1e-14
 
 
+@pytest.mark.full
 def test_a_long_path_has_a_thousand_poses(tmp_path: Path) -> None:
     plan = plan_of("scorbot_draw", "output.rate=10")
     slow = plan_of("ur5e_poses", "moves.0.minimum_duration=60", "output.rate=10")
@@ -387,6 +388,7 @@ def test_uncompressed_files_are_reproducible(pick: Plan, pick_log: Path, tmp_pat
     assert other.read_bytes() == pick_log.read_bytes()
 
 
+@pytest.mark.full
 def test_few_rows_do_not_make_long_chunks(tmp_path: Path) -> None:
     """Two rows an hour apart: the frames between them fill several chunks."""
     plan = plan_of("ur5e_poses", "moves.0.minimum_duration=100", "output.rate=0.001")
