@@ -11,7 +11,7 @@ PYTEST := $(STREAMS) PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n auto --
 PEERS := .venv-peers
 EXTRAS ?= dev  # dev,dask,docs,viewers: also what the tests of viewers, of the site and of clusters need
 
-.PHONY: setup demo check format lint types test soak mutants bench golden schema docs player picture site release-check release clean
+.PHONY: setup demo check format lint types test soak mutants planted bench golden schema docs player picture site release-check release clean
 
 setup: $(STAMP)
 
@@ -52,6 +52,9 @@ SEED ?= 1
 mutants: $(STAMP)  ## mutants of code that proves or judges; FILES='trajcli/judge/*': those alone; SAMPLE=50: that many a file
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(strip $(EXTRAS)),mutants]'
 	$(BIN)/python -m tests.mutants $(foreach pattern,$(FILES),'$(pattern)') --sample $(SAMPLE) --seed $(SEED)
+
+planted: $(STAMP)  ## mutants that somebody wrote, which tests once killed; FILES='trajcli/judge/*': those alone
+	$(BIN)/python -m tests.mutants.planted $(foreach pattern,$(FILES),'$(pattern)')
 
 bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run; GROUP='planning jerk_limited': these alone
 	$(BIN)/python -m benchmarks $(GROUP) --peers $(PEERS)/bin/python

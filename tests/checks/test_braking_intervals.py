@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -147,3 +149,70 @@ def test_the_smaller_of_two_jerks_says_how_long_braking_lasts(side):
 def test_an_acceleration_alone_is_a_direction_to_brake_along(side):
     falls = _motion(0.0, 3.0 * side, [(0.75, -4.0 * side)])
     assert _findings(falls, _limits(velocity=9.0), "line") == []
+
+
+def _later(phases, joint, side, after):
+    """Return one joint of two that cruises for a second, then follows phases, then others: two moves or three."""
+    turned = slice(None, None, -1 if joint else 1)
+    whole = _motion(3.0 * side, 0.0, [(t, side * j) for t, j in [(1.0, 0.0), *phases, *after]])
+    breaks, coefficients = whole.curve.breaks, whole.curve.coefficients[:, :, turned]
+    borders = [0.0, 1.0, float(breaks[1 + len(phases)]), float(breaks[-1])]
+    if not after:
+        borders = borders[:3]
+    spans = tuple(Span(k, "jerk_limited", a, b, 2) for k, (a, b) in enumerate(pairwise(borders)))
+    ends = [
+        State(*(getattr(state, name)[turned] for name in ("position", "velocity", "acceleration")))
+        for state in (whole.start, whole.end)
+    ]
+    return Trajectory(PiecewisePolynomial(breaks, coefficients), ("a", "b"), ("revolute",) * 2, spans, *ends)
+
+
+@pytest.mark.parametrize("how", ["each", "line"])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_any_joint_brakes_in_any_move(joint, side, how):
+    """At speed under wide limits, then braking under narrow ones, then at speed once more: only the second is excused."""
+    brakes, faster = [(0.5, -4.0), (0.75, 0.0), (0.5, 4.0)], [(0.5, 4.0), (0.75, 0.0), (0.5, -4.0)]
+    wide, narrow = _limits(velocity=3.0), _limits()
+    late = [(0.01, 0.0), *brakes]
+    for phases, found in ((brakes, set()), (late, {(1, "velocity")})):
+        for after in ([], faster):
+            trajectory = _later(phases, joint, side, after)
+            count = len(trajectory.spans)
+            promises = [Promise(braking=how if k == 1 else None) for k in range(count)]
+            findings = verify(trajectory, [wide, narrow, wide][:count], promises).findings
+            assert {(each.move, each.kind) for each in findings} == found
+            assert {each.joint for each in findings} <= {"ab"[joint]}
+            unexcused = verify(trajectory, [wide, narrow, wide][:count], [Promise()] * count).findings
+            assert {each.move for each in unexcused} == {1}
+
+
+@pytest.mark.parametrize("how", ["each", "line"])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_where_an_acceleration_leads_is_excused_in_either_direction(side, how):
+    """From 0.9 rad/s with 2 rad/s^2 the joint cannot but reach 1.4; a tenth of a second more of it is too much."""
+    leads = [(1.0, -4.0 * side), (0.5, 4.0 * side)]
+    assert _findings(_motion(0.9 * side, 2.0 * side, leads), _limits(), how) == []
+    assert _findings(_motion(0.9 * side, 2.0 * side, leads), _limits(), None) == [("a", "velocity")]
+    later = [(0.02, 0.0), *leads]
+    assert _findings(_motion(0.9 * side, 2.0 * side, later), _limits(), how) == [("a", "velocity")]
+
+
+def test_two_joints_that_brake_are_each_excused():
+    """One forward, one backward, from other speeds."""
+    first, second = (
+        _motion(v, 0.0, [(0.5, j), (hold, 0.0), (0.5, -j), *rest])
+        for v, j, hold, rest in ((3.0, -4.0, 0.75, [(0.5, 0.0)]), (-4.0, 4.0, 1.25, []))
+    )
+    breaks = np.union1d(np.round(first.curve.breaks, 12), np.round(second.curve.breaks, 12))
+    curves = [each.curve for each in (first, second)]
+    rows = np.stack(
+        [[curve.evaluate(breaks[:-1], k)[:, 0] / (1, 1, 2, 6)[k] for k in (3, 2, 1, 0)] for curve in curves],
+        axis=-1,
+    )
+    curve = PiecewisePolynomial(breaks, rows)
+    ends = [State(*(curve.evaluate(np.array([t]), k)[0] for k in range(3))) for t in (0.0, breaks[-1])]
+    span = Span(0, "jerk_limited", 0.0, float(breaks[-1]), 2)
+    trajectory = Trajectory(curve, ("a", "b"), ("revolute",) * 2, (span,), *ends)
+    assert _findings(trajectory, _limits()) == []
+    assert sorted(_findings(trajectory, _limits(), None)) == [("a", "velocity"), ("b", "velocity")]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hermite_curves import hermite_pieces
 
-from trajcli.checks.tool import SampledTool, check_tool
+from trajcli.checks.tool import SampledTool, _check_speeds, check_tool
 from trajcli.checks.verify import limit_findings, verify
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
@@ -19,7 +19,7 @@ from trajcli.geometry.paths.position import Line
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.following.tool_path import SpeedLimits, ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits, unlimited
@@ -364,3 +364,53 @@ def test_findings_about_the_tool_say_what_is_wrong_and_what_would_fix_it():
         "the arm changes its branch at t = # s: it passes a singularity",
         "move the path",
     )
+
+
+def later(rows: SampledTool, begins: float) -> SampledTool:
+    """Return rows of a second move, before which the arm stands for a while."""
+    still = constant(rows.trajectory.curve.evaluate(0.0), begins)
+    whole = trajectory_of(rows.robot, concatenate([still, rows.trajectory.curve]))
+    end = begins + rows.trajectory.curve.duration
+    return dataclasses.replace(rows, trajectory=whole, span=Span(1, "line", begins, end, 2))
+
+
+@pytest.mark.parametrize("begins", [0.0, 1.5])
+@pytest.mark.parametrize("slow", [0, 1, None])
+@pytest.mark.parametrize("which", ["speed", "angular_speed"])
+def test_each_segment_of_a_path_has_its_own_limits_of_speed(which: str, slow: int | None, begins: float):
+    """Both halves reach the same speed, where they meet: of one of them less is allowed."""
+    peak = SPEED if which == "speed" else SPEED * TURN / LENGTH
+    path = RIGHT.motion.path
+    assert path is not None
+    allowed = np.array([peak * (1 + 1e-4)] * 2)
+    if slow is not None:
+        allowed[slow] = 0.9 * peak
+    free = np.full(2, np.inf)
+    borders = np.array([0.0, path.length / 2, path.length])
+    of_speed = (allowed, free) if which == "speed" else (free, allowed)
+    motion = dataclasses.replace(
+        RIGHT.motion, path=dataclasses.replace(path, speeds=SpeedLimits(borders, (0, 1, 2), *of_speed))
+    )
+    rows = dataclasses.replace(RIGHT, motion=motion)
+    found = list(_check_speeds(later(rows, begins) if begins else rows))
+    assert len(found) == (slow is not None)
+    for each in found:
+        assert each.kind == f"tool_{which}"
+        assert each.message.startswith(f"segment {slow}: ")
+        assert each.value == pytest.approx(peak, rel=1e-3)
+        assert each.time == pytest.approx(begins + DURATION / 2, abs=0.05)
+        assert each.move == (1 if begins else 0)
+
+
+def test_a_branch_and_a_bound_have_the_times_of_the_whole():
+    beside = shifted(RIGHT, 1e-3 * np.eye(6)[2])
+    alone, after = ([each.time for each in check_tool(rows)] for rows in (beside, later(beside, 1.5)))
+    assert len(alone) == 2
+    assert after == pytest.approx([time + 1.5 for time in alone], abs=1e-6)
+    crossing = planar(lambda t: 0.4 - 0.4 * t)
+    (here,), (there,) = (
+        [each for each in check_tool(rows) if each.kind == "branch"]
+        for rows in (crossing, later(crossing, 1.5))
+    )
+    assert there.time == pytest.approx(here.time + 1.5, abs=1e-9)
+    assert here.time == pytest.approx(1.0, abs=0.1)

@@ -81,3 +81,15 @@ def test_the_verdict_holds_what_is_wrong_with_parts() -> None:
     verdict = verify(whole, [FREE], [promise])
     assert not verdict.passed
     assert ("velocity", 0) in {(each.kind, each.move) for each in verdict.findings}
+
+
+@pytest.mark.parametrize("move", [0, 1])
+def test_a_part_is_judged_in_its_own_move_alone(move: int) -> None:
+    """Of the first move its end, at 3 forward, and of the second one its start, at 1 backward."""
+    bounds = (-0.5, 9.0) if move == 0 else (-9.0, 0.5)
+    of_move = (
+        [part(2.5, 3.5, limits(2, velocity=bounds))]
+        if move == 0
+        else [part(0.0, 1.0, limits(2, velocity=bounds))]
+    )
+    assert found(*([of_move, []] if move == 0 else [[], of_move])) == []

@@ -254,3 +254,14 @@ def test_between_two_moves_the_tool_has_the_looser_limits() -> None:
     by_move = dict(enumerate(map(bare_robot, limits)))
     tcp = Requirements(by_move[0], by_move=by_move).robot_between(0, 1).limits.tcp
     assert (tcp.speed, tcp.jerk, tcp.acceleration) == (0.2, 5.0, np.inf)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_between_two_moves_the_looser_limits_by_position_are_in_force(first: bool) -> None:
+    """Half as fast is a quarter of the deceleration and half of the offset; without a limit all is allowed."""
+    position, none = np.tile([-9.0, 9.0], (3, 1)), [np.inf, 0.0]
+    rows = [[20.0, 0.1], [5.0, 0.05], none], [[5.0, 0.05], [20.0, 0.1], [5.0, 0.05]]
+    limits = [replace(unlimited(3), position=position, velocity_by_position=np.array(each)) for each in rows]
+    by_move = dict(enumerate(map(bare_robot, limits if first else limits[::-1])))
+    between = Requirements(by_move[0], by_move=by_move).robot_between(0, 1).limits
+    assert between.velocity_by_position.tolist() == [[20.0, 0.1], [20.0, 0.1], none]

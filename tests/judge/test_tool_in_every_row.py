@@ -20,6 +20,7 @@ from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.recorded_tool import ToolJudge
 from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
 from trajcli.judge.tool_columns import ToolTable, judge_tool_columns
+from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import tcp_twist
 from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
@@ -247,7 +248,7 @@ COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", 
 
 
 def columns_beside(
-    q: np.ndarray, qd: np.ndarray, values: np.ndarray, size: int = 40, half: float = 0.0
+    q: np.ndarray, qd: np.ndarray | None, values: np.ndarray, size: int = 40, half: float = 0.0
 ) -> list[Finding]:
     """Return what pose and twist are found to be wrong, in blocks of some rows."""
     robot, count = link(), len(q)
@@ -307,3 +308,89 @@ def test_a_turned_quaternion_is_found_by_how_much(angle: float) -> None:
     (found,) = columns_beside(q, qd, values)
     assert (found.quantity, found.row) == ("orientation", 51)
     assert found.value == pytest.approx(abs(angle), rel=1e-4)
+
+
+@pytest.mark.parametrize("column", [0, 7])
+def test_rates_that_are_judged_from_row_to_row_hide_no_wrong_pose(column: int) -> None:
+    """Beside positions alone the twist is judged by how the tool moves, and the pose by where it is."""
+    q, _, values = true_columns()
+    assert columns_beside(q, None, values) == []
+    if column == 7:
+        values[:, 7] += 0.1
+    values[50, 0] += 1e-6
+    quantities = {each.quantity for each in columns_beside(q, None, values)}
+    assert quantities == ({"position"} if column == 0 else {"position", "velocity"})
+
+
+@pytest.mark.parametrize(("share", "certainty"), [(0.5, "within rounding"), (1.5, "exceeded")])
+def test_rounding_of_rows_explains_so_much_beside_a_path(share: float, certainty: str) -> None:
+    """By the module's slack: twice the length of the arm, or 2 where that is longer, times what all joints are off."""
+    t, q, _ = (each.copy() for each in line(60))
+    off, robot, path = np.full(6, 1e-6), plan().moves[0].robot, plan().moves[0].planned.tool
+    slack = 2 * max(characteristic_length(robot), 1.0) * off.sum()
+    q[60] += moved(q[60], (path.tolerance.position + share * slack) * aside(), np.zeros(3))
+    motion = RecordedMotion(
+        t, q, None, None, None, None, np.zeros(len(t), int), None, Resolution(0.0, off, off, off), "rows"
+    )
+    required = Requirements(robot, tool=lambda: ToolJudge(robot, {0: path}))
+    findings = judge_motion(lambda: [motion], required).findings
+    (found,) = [each for each in findings if (each.kind, each.quantity) == ("deviation", "position")]
+    assert (found.certainty, found.severity) == (certainty, "error")
+
+
+@pytest.mark.parametrize("beyond", [5e-5, 5e-6])
+def test_a_little_more_than_its_limit_is_more(beyond: float) -> None:
+    t = 0.3 * np.arange(5)
+    q = np.zeros((5, 2))
+    q[:, 0] = t
+    (found,) = of_tool(rows(t, q), link(speed=LEVER / (1 + beyond)))
+    assert (found.severity, found.certainty) == ("error", "exceeded")
+
+
+def test_one_interval_that_is_long_leaves_nothing_unresolved() -> None:
+    t = np.append(PERIOD * np.arange(10), 0.5)
+    q, qd = np.zeros((11, 2)), np.zeros((11, 2))
+    q[:, 0], qd[:, 0] = t, 1.0
+    qd[4:6, 0] = 0.8
+    (found,) = of_tool(rows(t, q, qd), link(speed=LEVER * 1.05))
+    assert found.severity == "error"
+
+
+@pytest.mark.parametrize(("key", "excess"), [("acceleration", 20.0), ("jerk", 600.0)])
+def test_rounding_counts_with_the_speed_at_which_the_tool_is_turned(key: str, excess: float) -> None:
+    """At 10 rad/s: a speed that is off by 15/8 of 2 off puts L w^2 off by 37.5 off, and L w^3 by 562 off."""
+    t, rate, off = np.arange(4.0), 10.0, 1e-4
+    q, qd = np.zeros((4, 2)), np.zeros((4, 2))
+    q[:, 0], qd[:, 0] = rate * t, rate
+    size = LEVER * rate ** (2 if key == "acceleration" else 3)
+    (found,) = of_tool(rows(t, q, qd, 0 * q, off=off), link(**{key: size - excess * off}), "quintic")
+    assert (found.kind, found.certainty) == (f"tool_{key}", "within rounding")
+    (found,) = of_tool(rows(t, q, qd, 0 * q, off=off), link(**{key: 0.99 * size}), "quintic")
+    assert found.certainty == "exceeded"
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_jerk_of_the_tool_is_judged_where_some_rows_have_accelerations(first: bool) -> None:
+    t = np.arange(8.0)
+    stated = (np.arange(8) < 4) == first
+    q, still = np.zeros((8, 2)), np.zeros((8, 2))
+    q[2 if first else 6 :, 0] = 1e-3  # within those that have
+    qdd = np.where(stated[:, None], 0.0, np.full((8, 2), np.nan))
+    motion = rows(t, q, still, qdd)
+    (found,) = of_tool(motion, link(jerk=0.9 * LEVER * 60e-3), "jtc")
+    assert found.value == pytest.approx(LEVER * 60e-3, rel=1e-4)
+    assert of_tool(motion, link(jerk=1.01 * LEVER * 60e-3), "jtc") == []
+
+
+@pytest.mark.parametrize("jump", [1, 3, 5])
+@pytest.mark.parametrize(
+    ("turn", "slide", "smooth"), [(0.035, 0.0, True), (0.045, 0.0, False), (0.0, 0.045, False)]
+)
+def test_joints_change_their_branch_where_the_tool_goes_on_as_before(
+    turn: float, slide: float, smooth: bool, jump: int
+) -> None:
+    """The tool turns by 0.01 from row to row; a step of up to four times that is none of the tool."""
+    steps = np.tile([0.01, 0.0], (6, 1))
+    steps[jump] = [turn, slide] if turn else [0.01, slide]
+    q = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    assert ToolJudge(link()).changes_branch(q, jump) == smooth

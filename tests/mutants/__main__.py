@@ -12,8 +12,6 @@ import ast
 import hashlib
 import os
 import random
-import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -29,6 +27,7 @@ from cosmic_ray.testing import run_tests
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import MutationSpec, TestOutcome
 
+from tests.mutants.copies import copy_of_the_tree
 from tests.mutants.tables import Survivor, operators, read_survivors, subjects, write_score
 
 SESSIONS = Path(".mutants").resolve()
@@ -127,19 +126,6 @@ def campaign(path: str, tests: tuple[str, ...], sample: int, seed: int) -> int:
 def explained(mutant: Mutant, accepted: list[Survivor]) -> bool:
     """Return whether survivors.toml gives a reason for a mutant."""
     return any((survivor.line, survivor.change) == (mutant.line, mutant.change) for survivor in accepted)
-
-
-def copy_of_the_tree(target: Path) -> None:
-    """Copy the files of the repository, those not yet added included."""
-    listing = subprocess.run(
-        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        check=True,
-        capture_output=True,
-    )
-    for name in filter(None, listing.stdout.decode().split("\0")):
-        if Path(name).is_file():
-            (target / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(name, target / name)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Tables of the mutation campaign: files with their tests, operators, scores, and survivors with their reasons."""
+"""Tables of the mutation campaign: files with their tests, operators, scores, mutants by hand, survivors with reasons."""
 
 from __future__ import annotations
 
@@ -24,6 +24,15 @@ class Survivor:
     why: str
 
 
+@dataclass(frozen=True)
+class Planted:
+    """A mutant that somebody wrote: a text that stands in a file, and what takes its place where it first stands."""
+
+    file: str
+    text: str
+    change: str
+
+
 def _read(name: str) -> dict[str, Any]:
     return tomllib.loads((HERE / name).read_text(encoding="utf-8"))
 
@@ -43,6 +52,11 @@ def operators() -> frozenset[str]:
 def read_survivors() -> list[Survivor]:
     """Return the survivors that have a reason."""
     return [Survivor(**entry) for entry in _read("survivors.toml").get("survivor", [])]
+
+
+def read_planted() -> list[Planted]:
+    """Return the mutants that somebody wrote, file by file."""
+    return [Planted(path, *pair) for path, pairs in _read("planted.toml").items() for pair in pairs]
 
 
 def read_scores() -> dict[str, dict[str, int]]:

@@ -5,7 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.mutants.tables import KINDS, Survivor, read_scores, read_survivors, subjects, write_score
+from tests.mutants.tables import (
+    KINDS,
+    Survivor,
+    read_planted,
+    read_scores,
+    read_survivors,
+    subjects,
+    write_score,
+)
 
 ROOT = Path(__file__).parents[2]
 WHOLE = ("checks", "judge", "dynamics", "limits", "consumers")
@@ -45,6 +53,16 @@ def test_each_file_that_proves_or_judges_is_in_the_table_with_tests_that_exist()
     named = {*table, *(test for tests in table.values() for test in tests)}
     assert not missing
     assert not [path for path in named if not (ROOT / path).exists()]
+
+
+def test_planted_mutants_are_of_files_in_the_table_and_most_of_them_stand_there() -> None:
+    """Who changes a line need not change its mutants at once: `make planted` names those whose text is gone."""
+    planted = read_planted()
+    assert {mutant.file for mutant in planted} <= subjects().keys()
+    assert len(set(planted)) == len(planted)
+    assert all(mutant.text != mutant.change for mutant in planted)
+    texts = {mutant.file: (ROOT / mutant.file).read_text(encoding="utf-8") for mutant in planted}
+    assert sum(mutant.text in texts[mutant.file] for mutant in planted) >= 0.9 * len(planted)
 
 
 def test_no_stored_number_of_our_own_kills_a_mutant() -> None:

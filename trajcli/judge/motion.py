@@ -352,7 +352,10 @@ def _looser(a: Limits, b: Limits) -> Limits:
         for name, (one, other) in both.items()
     }
     tcp = {name: max(value, getattr(b.tcp, name)) for name, value in vars(a.tcp).items()}
-    return replace(a, **rows, tcp=type(a.tcp)(**tcp))
+    (d, offset), (other_d, other_offset) = a.velocity_by_position.T, b.velocity_by_position.T
+    looser = (other_d > d) | ((other_d == d) & (other_offset < offset))  # those of moves differ by one factor
+    near = np.where(looser[:, None], b.velocity_by_position, a.velocity_by_position)
+    return replace(a, **rows, tcp=type(a.tcp)(**tcp), velocity_by_position=near)
 
 
 def _check_finite(rows: Array | None, block: RecordedMotion, numbers: NDArray[np.int64]) -> None:

@@ -193,3 +193,33 @@ def test_a_rate_that_turns_around_smoothly_is_no_corner():
         np.array([0.0, 1.0, 2.0]), np.array([[[-1.0], [-1.0]], [[2.0], [0.0]], [[0.0], [1.0]]])
     )
     assert corners(path).size == 0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_speed_between_its_ends_is_seen_whatever_another_joint_may_do(joint, side):
+    """0.9 at both ends and 1.2 between them, as 0.9 + 1.2 t (1 - t), with little of an acceleration of 100.
+
+    The other joint rests, and may hardly accelerate; of both directions one has more room.
+    """
+    coefficients = np.zeros((4, 2, 1))
+    coefficients[:, joint, 0] = side * np.array([-0.4, 0.6, 0.9, 0.0])
+    velocity = np.tile([-1.0, 1.0], (2, 1))
+    acceleration = np.tile([-0.1, 0.1], (2, 1))
+    acceleration[joint] = [-100.0, 100.0]
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.zeros((1, 1, 2)))
+    constraint = JointConstraint(path, velocity, acceleration)
+    (used, _) = constraint._excess(coefficients, np.ones(1))
+    assert 1.2 - 1e-9 <= used[0] <= 1.6
+    velocity[joint] = [-1.0, 9.0] if side > 0 else [-9.0, 1.0]
+    assert JointConstraint(path, velocity, acceleration)._excess(coefficients, np.ones(1))[0][0] < 1.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("at_end", [False, True])
+def test_rest_up_to_rounding_is_rest_at_either_end_of_a_path_in_either_direction(at_end, sign):
+    """q' goes from 1e-17 to 1, or back."""
+    rising = np.array([[[0.5]], [[1e-17]], [[0.0]]])
+    falling = np.array([[[-0.5]], [[1.0 + 1e-17]], [[0.0]]])
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), sign * (falling if at_end else rising))
+    assert is_at_rest(path) == (not at_end, at_end)

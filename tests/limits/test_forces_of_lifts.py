@@ -1,0 +1,147 @@
+"""Limits of efforts of two lifts, whose forces are known: each joint, each direction, with and without gravity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.dynamics.effort_bound import EffortPeak
+from trajcli.findings import Finding
+from trajcli.kinematics.robot import Joint, LinkInertia, Robot, unlimited
+from trajcli.limits.effort import FAMILY, MoveEfforts
+from trajcli.limits.kinds import LimitedMove
+from trajcli.limits.tolerances import EFFORT_RELATIVE
+from trajcli.trajectory import Span, State, Trajectory
+
+MASS, G = 5.0, 9.81
+
+
+def lifts(bounds: list[list[float]], gravity: float = G) -> Robot:
+    """Return two slides along one vertical line; the second one carries 5 kg, and the first one no more."""
+    links = LinkInertia(1e-9, (0.0, 0.0, 0.0), (0.0,) * 6), LinkInertia(MASS, (0.0, 0.0, 0.0), (0.0,) * 6)
+    joints = tuple(Joint(f"s{k}", "prismatic", link=links[k]) for k in range(2))
+    limits = replace(unlimited(2), effort=np.array(bounds))
+    return Robot(
+        "lifts", joints, limits, "standard", np.eye(4), np.eye(4), gravity=np.array([0.0, 0.0, -gravity])
+    )
+
+
+def moved(robot: Robot, acceleration: float, begins: float = 0.0) -> LimitedMove:
+    """Return the second lift with one acceleration for a second, perhaps after a rest."""
+    rows = np.zeros((3, 1, 2))
+    rows[0, 0, 1] = acceleration / 2
+    breaks = np.array([0.0, 1.0])
+    if begins:
+        rows, breaks = (
+            np.concatenate([np.zeros((3, 1, 2)), rows], axis=1),
+            np.array([0.0, begins, begins + 1.0]),
+        )
+    curve = PiecewisePolynomial(breaks, rows)
+    states = (State(*(np.zeros(2) for _ in range(3))) for _ in range(2))
+    span = Span(1, "quintic", begins, begins + 1.0, 2)
+    trajectory = Trajectory(curve, robot.joint_names, robot.joint_types, (span,), *states)
+    return LimitedMove(trajectory, span, robot.limits, robot)
+
+
+def over(robot: Robot, acceleration: float, begins: float = 0.0) -> list[Finding]:
+    survey = FAMILY.survey(moved(robot, acceleration, begins))
+    assert survey is not None
+    return list(survey.over(robot, begins))
+
+
+WIDE = [-900.0, 900.0]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("begins", [0.0, 2.5])
+def test_a_force_over_its_limit_is_found_with_the_stretch_that_helps(
+    begins: float, joint: int, side: float
+) -> None:
+    """Both need m (g + 4) = 69.05 N; at k times the duration m (g + 4 / k^2). Gravity may point up."""
+    needed, limit = MASS * (G + 4.0), 60.0
+    bounds = [WIDE, WIDE]
+    bounds[joint] = [-900.0, limit] if side > 0 else [-limit, 900.0]
+    robot = lifts(bounds, side * G)
+    (found,) = over(robot, side * 4.0, begins)
+    assert (found.kind, found.joint, found.method, found.severity) == (
+        "effort",
+        f"s{joint}",
+        "bounded",
+        "error",
+    )
+    assert [found.value, found.limit] == pytest.approx([side * needed, side * limit], rel=1e-6)
+    assert found.factor == pytest.approx(np.sqrt(MASS * 4.0 / (limit - MASS * G)), rel=1e-5)
+    assert -1e-9 <= found.time <= 1.0 + 1e-9
+    assert found.message.startswith("{joint} needs a force of {value}")
+    assert found.amounts["gravity"].value == pytest.approx(side * MASS * G)
+    assert [found.amounts[name].rounded for name in ("value", "limit")] == (
+        ["up", "down"] if side > 0 else ["down", "up"]
+    )
+    assert over(robot, side * 2.1, begins) == []
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_what_gravity_alone_exceeds_no_duration_helps(joint: int, side: float) -> None:
+    bounds = [WIDE, WIDE]
+    bounds[joint] = [-900.0, 40.0] if side > 0 else [-40.0, 900.0]
+    robot = lifts(bounds, side * G)
+    survey = FAMILY.survey(moved(robot, side * 1.0))
+    assert survey is not None
+    (found,) = survey.over(robot)
+    assert found.factor is None
+    held = survey.held_over()
+    assert held is not None
+    assert (held[0], held[1]) == (joint, side * 40.0)
+    assert held[2].static == pytest.approx(MASS * G)
+    bounds[joint] = [-900.0, 52.0] if side > 0 else [-52.0, 900.0]
+    slower = FAMILY.survey(moved(lifts(bounds, side * G), side * 1.0))
+    assert slower is not None
+    assert slower.held_over() is None
+    assert len(list(slower.over(robot))) == 1
+
+
+def peaks(*highest: float) -> tuple[EffortPeak, ...]:
+    return tuple(EffortPeak(each, 0.0, each, (each, 0.0, 0.0, 0.0)) for each in highest)
+
+
+@pytest.mark.parametrize("share", [1 + 2 * EFFORT_RELATIVE, 1 - 1e-9, 0.5])
+@pytest.mark.parametrize(("joint", "sign"), [(0, 1), (0, -1), (1, 1), (1, -1)])
+def test_the_largest_share_of_all_joints_and_directions_counts(joint: int, sign: int, share: float) -> None:
+    """Limits differ by joint and direction; all others take a tenth of theirs."""
+    bounds = [[-10.0, 20.0], [-40.0, 30.0]]
+    robot = lifts(bounds)
+    highest, lowest = [2.0, 3.0], [1.0, 4.0]
+    taken = share * (bounds[joint][1] if sign > 0 else -bounds[joint][0])
+    (highest if sign > 0 else lowest)[joint] = taken
+    survey = MoveEfforts(robot, None, peaks(*highest), peaks(*lowest))  # type: ignore[arg-type]
+    assert survey.share() == pytest.approx(share)
+    assert (survey.excess() > 0) == (share > 1)
+    found = [(k, way, limit) for k, way, limit, _ in survey.beyond()]
+    size = bounds[joint][1] if sign > 0 else -bounds[joint][0]
+    assert found == ([(joint, sign, size)] if share > 1 else [])
+    nothing = MoveEfforts(robot, None, peaks(np.nan, 0.0), peaks(0.0, 0.0))  # type: ignore[arg-type]
+    assert [(k, way) for k, way, _, _ in nothing.beyond()] == [(0, 1)]
+
+
+def test_all_that_is_over_is_found() -> None:
+    survey = MoveEfforts(lifts([[-1.0, 1.0]] * 2), None, peaks(2.0, 2.0), peaks(2.0, 2.0))  # type: ignore[arg-type]
+    assert [(k, way) for k, way, _, _ in survey.beyond()] == [(0, 1), (0, -1), (1, 1), (1, -1)]
+
+
+def test_half_of_the_tolerance_is_left_to_rounding() -> None:
+    for share, over_it in ((1 + 0.4 * EFFORT_RELATIVE, False), (1 + 0.6 * EFFORT_RELATIVE, True)):
+        survey = MoveEfforts(lifts([[-1.0, 1.0]] * 2), None, peaks(share, 0.0), peaks(0.0, 0.0))  # type: ignore[arg-type]
+        assert (survey.excess() > 0) == over_it
+        assert list(survey.beyond()) == []
+
+
+def test_a_move_without_length_and_an_arm_that_nobody_knows_have_none() -> None:
+    move = moved(lifts([WIDE, WIDE]), 1.0)
+    assert FAMILY.survey(replace(move, robot=None)) is None
+    still = replace(move, span=replace(move.span, end=move.span.start))
+    assert FAMILY.survey(still) is None
