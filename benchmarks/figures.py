@@ -93,15 +93,25 @@ class Figure:
         if not runs:
             return "-"
         amount = median(runs)
-        return f"{amount / MEGABYTE:.1f} MB" if self.kind == "memory" else f"{amount * 1e3:.0f} ms"
+        return f"{amount / MEGABYTE:.1f} MB" if self.kind == "memory" else _seconds(amount)
 
     def _judged(self) -> tuple[str, str]:
         if self.kind == "memory":
             value = "-" if self.value is None else f"{self.value / MEGABYTE:+.1f} MB"
             return value, f"{self.goal / MEGABYTE:+.0f} MB"
         if self.kind == "seconds":
-            return f"{self.value:.2f} s", f"{self.goal:.2f} s"
+            return _seconds(self.value), _seconds(self.goal)
         return "-" if self.value is None else f"{self.value:.2f}", f"{self.goal:.2f}"
+
+
+def _seconds(amount: float | None) -> str:
+    """Return a time in a unit that suits it."""
+    if amount is None:
+        return "-"
+    for unit, size, digits in (("s", 1.0, 2), ("ms", 1e-3, 0 if amount >= 0.01 else 1)):
+        if amount >= 10 * size or (unit == "s" and amount >= 1.0) or (unit == "ms" and amount >= size):
+            return f"{amount / size:.{digits}f} {unit}"
+    return f"{amount * 1e6:.1f} us"
 
 
 def table(figures: Sequence[Figure]) -> str:

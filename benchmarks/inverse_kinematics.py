@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
 import sys
 from functools import partial
 from math import pi
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from benchmarks.contest import Command, Function, compete
 from benchmarks.figures import Figure
@@ -138,6 +142,41 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
         "peer": Command([sys.executable, "-c", _IMPORTS]),
     }
     found.append(_figure("ik, whole process", "import numpy, yaml, pydantic", compete(contestants), 2.0))
+    return [*found, _of_a_stream()]
+
+
+def _of_a_stream() -> Figure:
+    """Return the figure of `ik -`: time of a pose at random beyond the first, written as CSV."""
+    with TemporaryDirectory() as folder:
+        files = {count: Path(folder, f"{count}.csv") for count in (1, POSES)}
+        rows = (",".join(f"{value:.12f}" for value in pose) for pose in _poses_of("ur5e", POSES))
+        text = ["x,y,z,qw,qx,qy,qz\n", *(f"{row}\n" for row in rows)]
+        for count, file in files.items():
+            file.write_text("".join(text[: count + 1]), encoding="utf-8")
+        call = f"exec '{sys.executable}' -m trajcli ik - --robot ur5e < "
+        runs = compete(
+            {str(count): Command(["sh", "-c", f"{call}'{file}'"]) for count, file in files.items()}
+        )
+    one, all_of_them = (runs[str(count)].seconds for count in files)
+    each = [(many - few) / (POSES - 1) for many, few in zip(all_of_them, one, strict=True)]
+    return Figure("ik -, each pose of a UR5e", "seconds", each, [], 1e-5, kind="seconds")
+
+
+def _poses_of(name: str, count: int) -> list[list[float]]:
+    """Return positions and quaternions at random configurations, made in a process of its own."""
+    script = (
+        "import json, sys, numpy as np\n"
+        "from trajcli.geometry.rotation import quaternion_from_matrix\n"
+        "from trajcli.job.robot import load_robot\n"
+        "from trajcli.kinematics.forward import forward\n"
+        "name, count = sys.argv[1], int(sys.argv[2])\n"
+        "q = np.random.default_rng(1).uniform(-3, 3, (count, 6))\n"
+        "poses = forward(load_robot(name), q)\n"
+        "rows = np.concatenate([poses[:, :3, 3], quaternion_from_matrix(poses[:, :3, :3])], axis=1)\n"
+        "json.dump(rows.tolist(), sys.stdout)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script, name, str(count)], capture_output=True, check=True)
+    found: list[list[float]] = json.loads(done.stdout)
     return found
 
 

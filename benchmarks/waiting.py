@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.contest import ROOT, Command, compete
+from benchmarks.contest import ROOT, Command, Function, compete
 from benchmarks.figures import MEGABYTE, Figure
 
 PICK, POINTS = f"{ROOT}/examples/pick_carry_place.yaml", f"{ROOT}/examples/waypoints.yaml"
@@ -20,7 +20,7 @@ _HEAD = (
 def figures(peers: str | None, *, long: bool) -> list[Figure]:
     """Return the figures: against the plan of the same job, and in seconds."""
     with TemporaryDirectory() as folder:
-        return [*_answers(), *_many(Path(folder)), *(_waypoints(Path(folder)) if long else ())]
+        return [*_answers(), *_report(), *_many(Path(folder)), *(_waypoints(Path(folder)) if long else ())]
 
 
 def _answers() -> list[Figure]:
@@ -34,6 +34,36 @@ def _answers() -> list[Figure]:
         names = [" ".join(Path(word).name for word in each) for each in (words, against)]
         found.append(Figure(*names, runs["ours"].seconds, runs["against"].seconds, goal))
     return found
+
+
+def plan():
+    """Prepare the plan of a time-optimal move."""
+    from trajcli.job.read import load_job
+    from trajcli.planning.plan import plan_job
+
+    job = load_job(f"{ROOT}/examples/time_optimal.yaml")
+    return lambda: plan_job(job), _shown
+
+
+def report():
+    """Prepare the report of that plan, as JSON."""
+    from trajcli.job.read import load_job
+    from trajcli.output.report import report_of
+    from trajcli.planning.plan import plan_job
+
+    made = plan_job(load_job(f"{ROOT}/examples/time_optimal.yaml"))
+    return lambda: report_of(made).model_dump_json(), _shown
+
+
+def _shown(_result):
+    return []
+
+
+def _report() -> list[Figure]:
+    module = "benchmarks.waiting"
+    runs = compete({name: Function(sys.executable, module, name) for name in ("report", "plan")})
+    own, peer = "report of a time-optimal move as JSON", "its plan"
+    return [Figure(own, peer, runs["report"].seconds, runs["plan"].seconds, 0.2)]
 
 
 def _many(folder: Path) -> list[Figure]:

@@ -20,7 +20,16 @@ from numpy.typing import NDArray
 
 from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.hermite import hermite_coefficients
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct, read_only, taylor_shift
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    control_points,
+    derivative_coefficients,
+    distinct,
+    horner,
+    read_only,
+    taylor_shift,
+)
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import KnotGrid, UniformGrid, leave_short_pieces
@@ -41,6 +50,7 @@ _SHORTEST_STEP = 10_000  # ns: over a shorter interval, rounding would show in t
 _LONGEST_STEP = 200_000  # ns: what a small step needs
 _FEWER = 0.1  # of the deviation, between cubics: tools on paths promise a millionth themselves
 _MOST_PARTS = 64  # of an interval that is divided at once
+_SEEN = (0.15, 0.3, 0.5, 0.7, 0.85)  # of an interval: where what is missed is looked at
 _BLOCK = 16_384  # intervals looked at together: what is computed of them takes some MB
 _QUINTIC = 3  # derivatives that quintics share with a curve at their ends, of twice the order in their error
 
@@ -293,8 +303,35 @@ def _note_missed(
     short = max(0, joined.shape[0] - difference.shape[0])
     difference = np.concatenate([np.zeros((short, *difference.shape[1:])), difference])
     difference[-joined.shape[0] :] -= taylor_shift(joined[:, interval], (starts - times[interval])[:, None])
-    for order, (low, high) in enumerate(piece_extremes(difference, lengths, (0, 1, 2))):
-        np.maximum.at(missed[order], interval, np.maximum(-low, high))
+    part, joint = np.nonzero(_may_count(difference, lengths, interval, missed))
+    chosen, long = difference[:, part, joint, None], lengths[part]
+    for order, (low, high) in enumerate(piece_extremes(chosen, long, (0, 1, 2))):
+        np.maximum.at(missed[order], (interval[part], joint), np.maximum(-low, high)[:, 0])
+
+
+def _may_count(
+    difference: Array, lengths: Array, interval: NDArray[np.intp], missed: Array
+) -> NDArray[np.bool_]:
+    """Return of which polynomials (w, n) the extremes may count; of the others what is seen is enough.
+
+    An extreme counts where it is the largest of its joint, or where knots are to be inserted.
+
+    Args:
+        difference: What is missed, shape (degree + 1, w, n).
+        lengths: Shape (w,).
+        interval: To which of the intervals (k,) each belongs, shape (w,).
+        missed: What is missed in these, orders 0 to 2, shape (3, k, n): what is seen is written into it.
+    """
+    counts = np.zeros(difference.shape[1:], dtype=bool)
+    for order, own in enumerate(missed):
+        derivative = derivative_coefficients(difference, order)
+        bound = np.abs(control_points(derivative, lengths[:, None])).max(axis=0)
+        for part in _SEEN:
+            np.maximum.at(own, interval, np.abs(horner(derivative, part * lengths[:, None])))
+        counts |= bound > own.max(axis=0)
+        if order == 0:
+            counts |= bound > _FEWER * LARGEST_DEVIATION
+    return counts
 
 
 def _insertions(whole: Nanoseconds, missed: Array, stated: int) -> Nanoseconds:

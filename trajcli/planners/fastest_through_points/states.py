@@ -25,7 +25,7 @@ from trajcli.planners.fastest_through_points.state_times import (
 _FAR = 100.0  # for a bound that does not bind, in units of the scales or of the durations
 _FIRST, _LARGEST, _SMALLEST = 0.2, 0.5, 1e-4  # trust region, of the scales of the states
 _SLOWER, _SLOWINGS = 0.85, 40  # by how much, and how often, a joint that leaves its position limits is slowed
-_SHRUNK = 0.4
+_SHRUNK = 0.4  # of the trust region, after a gain that is poor or none
 _PATIENCE, _HOPE = 4, 0.25  # rounds, and the part of what is behind a rival that they must gain
 _GOOD, _POOR = 0.7, 0.3  # of the gain that was foreseen
 _TIME, _STATE, _RAMP, _WALLS, _WITH_WALLS = 0, 1, 3, 5, 7  # rows of a segment and joint, and how many
