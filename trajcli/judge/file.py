@@ -236,6 +236,7 @@ def _of_tool_columns(
         return [], set()
     from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
     from trajcli.judge.tool_columns import judge_tool_columns, open_tool_table
+    from trajcli.planning.planned_move import path_of_tool
 
     joints = len(given.robot.joints)
     rows = open_rows_of(source, topic=options.topic, field=options.field, joints=joints)
@@ -246,7 +247,7 @@ def _of_tool_columns(
     if planned:
         return [], read
     moves = () if given.plan is None else given.plan.moves
-    paths = None if given.plan is None else {move.index: move.planned.tool for move in moves}
+    paths = None if given.plan is None else {move.index: path_of_tool(move) for move in moves}
     blocks = motion.blocks(JUDGED_ROWS)
     seen = given.loaded.robot_of_rows
     return judge_tool_columns(

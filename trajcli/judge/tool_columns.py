@@ -256,6 +256,9 @@ class _Judge:
                     motion, np.abs(values[rows, 0]), self._table.half("path"), rows, "position"
                 )
                 continue
+            rows = self._outside_zones(motion, values, rows, of_move)
+            if not rows.size:
+                continue
             path, s = of_move.path, values[rows, 0]
             target = path.at_s(s, "right").target()
             off, split = residuals(target, poses[rows]), sum(target.position)
@@ -266,6 +269,21 @@ class _Judge:
             self._add_along_path(motion, away, slack + of_move.tolerance.position, rows, "position")
             self._add_along_path(motion, turned, slack + of_move.tolerance.angle, rows, "orientation")
             self._see_law(motion, values, rows, move)
+
+    def _outside_zones(
+        self, motion: RecordedMotion, values: Array, rows: NDArray[np.intp], of_move: ToolMotion
+    ) -> NDArray[np.intp]:
+        """Return the rows of a move on its path: in a zone s stays what it is on its border."""
+        (first, *_), (*_, last) = (ends[:, 0].tolist() for ends in of_move.law.piece_ends())
+        if of_move.path is None or abs(first) + abs(of_move.path.length - last) <= of_move.tolerance.position:
+            return rows
+        stays = ~values[rows, 1:].any(axis=1)
+        slack = self._table.half("path") + of_move.tolerance.position
+        for some in np.split(rows[stays], np.flatnonzero(np.diff(rows[stays]) > 1) + 1):
+            away = np.abs(values[some, 0][:, None] - [first, last]).min(axis=1)
+            if some.size:
+                self._add_along_path(motion, away, slack, some, "position")
+        return rows[~stays]
 
     def _add_along_path(
         self, motion: RecordedMotion, away: Array, slack: Array | float, rows: NDArray[np.intp], quantity: str

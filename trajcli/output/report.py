@@ -43,12 +43,14 @@ from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan
+from trajcli.planning.planned_move import path_of_tool
 from trajcli.planning.tightest import tightest_of_move
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import joint_units
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
+    from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.limits.kinds import LimitKind
     from trajcli.limits.tool_bound import SpeedRun, ToolPeak
     from trajcli.planning.causes import Cause
@@ -306,10 +308,13 @@ def _fastest(move: PlannedMove, span: Span) -> FastestReport | None:
 
 
 def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport | None:
-    """Return the report of the tool of a move along a path; None for a move in joint space."""
-    motion = move.planned.tool
+    """Return the report of the tool of a move along a path, outside of zones; None for one in joint space."""
+    motion = path_of_tool(move)
     if motion is None:
         return None
+    for part in move.planned.parts:
+        if part.tool is motion:
+            span = replace(span, start=span.start + part.start, end=span.start + part.end)
     from trajcli.checks.tool import SampledTool
 
     tool = SampledTool(trajectory, span, move.robot, motion)
@@ -319,7 +324,7 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
     wanted = move.planned.wanted_speed
     held, lowest = (None, None) if wanted is None else _held(move, motion.law, wanted, unit)
     return ToolReport(
-        length=float(motion.law.piece_ends()[1][-1, 0]),
+        length=_length(motion),
         unit=unit,
         ruled_by=motion.ruled_by,
         wanted_speed=wanted,
@@ -334,6 +339,12 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
         turned_bound=bounds[1],
         method="sampled" if None in bounds else "bounded",
     )
+
+
+def _length(motion: ToolMotion) -> float:
+    """Return the length of the path of a tool: beside a zone its law is that of a part."""
+    path = motion.path
+    return float(motion.law.piece_ends()[1][-1, 0]) if path is None else path.length
 
 
 def _segments(run: SpeedRun, span: Span) -> SegmentSpeedsReport:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from trajcli.trajectory import State
 
 _ROUNDING = 1e-12
 _NOWHERE = 1e-9  # rad or m: a joint that comes back so near to where it was need not move
+_NOTHING = 1e-9  # rad or m, and of the velocity limit: what rounding leaves of a joint that rests
 
 
 @comparable
@@ -64,7 +65,7 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
     breaches: list[LimitBreach] = []
     for joint in range(start.position.size):
         problem = _problem(start, end, limits, joint)
-        if problem.done:
+        if problem.done or _hardly_moves(problem):
             continue
         reason = _why_unbounded(problem)
         if reason:
@@ -129,10 +130,24 @@ def _problem(start: State, end: State, limits: Limits, joint: int) -> BoundaryPr
     ends = []
     for state in (start, end):
         rates = float(state.velocity[joint]), counts * float(state.acceleration[joint])
-        ends.append((float(state.position[joint]), *rates))
+        velocity, acceleration = (_onto(*each) for each in zip(rates, bounds[:2].tolist(), strict=True))
+        ends.append((float(state.position[joint]), velocity, acceleration))
     if abs(ends[1][0] - ends[0][0]) <= _NOWHERE:
         ends[1] = (ends[0][0], *ends[1][1:])
     return BoundaryProblem(f"joint {joint + 1}", ends[0], ends[1], bounds)
+
+
+def _onto(value: float, bounds: Sequence[float]) -> float:
+    """Return a value laid onto the bound that it exceeds by rounding."""
+    inside = min(max(value, bounds[0]), bounds[1])
+    return inside if abs(value - inside) <= _ROUNDING * abs(value) else value
+
+
+def _hardly_moves(problem: BoundaryProblem) -> bool:
+    """Return whether a joint only carries what others leave of rounding: nothing is bounded by that."""
+    speed = float(np.abs(problem.bounds[0]).min())
+    rates = max(abs(problem.initial[1]), abs(problem.final[1]))
+    return max(rates, abs(problem.displacement)) <= _NOTHING * min(speed, 1.0)
 
 
 def _why_unbounded(problem: BoundaryProblem) -> str | None:

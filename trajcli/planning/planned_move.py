@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate, constant
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob
@@ -19,6 +19,7 @@ from trajcli.planners.planner import PlannedMove, Planner, WhenOverLimit
 from trajcli.trajectory import Promise, Span, State
 
 if TYPE_CHECKING:
+    from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.language.targets import Target
     from trajcli.planning.adaptation import Adaptation
     from trajcli.planning.resolve_poses import ResolvedPose
@@ -86,10 +87,28 @@ def promises_of(moves: Sequence[PlannedMove]) -> list[Promise]:
     return promises
 
 
+def path_of_tool(move: PlannedMove) -> ToolMotion | None:
+    """Return the reference of the tool along its path, beside zones that of the part on it; None for none."""
+    return next((part.tool for part in move.planned.parts if part.tool is not None), move.planned.tool)
+
+
 def law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
-    """Return the time law s(t) of the tool along its path; while it turns in its place it has none."""
-    tool = move.planned.tool
-    return None if tool is None or tool.pure_rotation else tool.law
+    """Return the time law s(t) of the tool along its path; while it turns in its place it has none.
+
+    In a zone, where the tool has no path, s stays as it is on its border.
+    """
+    tool, parts = path_of_tool(move), move.planned.parts
+    if tool is None or tool.pure_rotation:
+        return None
+    if not parts:
+        return tool.law
+    (first, *_), (*_, last) = (ends[:, 0].tolist() for ends in tool.law.piece_ends())
+    pieces = [tool.law.shifted(-tool.law.start)]
+    if parts[0].around is not None:
+        pieces.insert(0, constant([first], parts[0].end - parts[0].start))
+    if parts[-1].around is not None:
+        pieces.append(constant([last], parts[-1].end - parts[-1].start))
+    return concatenate(pieces)
 
 
 def placed(loaded: LoadedJob, value: T, robot: Robot, joints: Array | None, standing: Target | None) -> T:

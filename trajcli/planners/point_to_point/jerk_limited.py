@@ -91,7 +91,7 @@ class JerkLimited(PointToPoint):
     def why_not_flown_by(self) -> str | None:
         """Why no motion can fly by a corner of this move; None where it can."""
         reasons = {
-            "it leaves open where it ends": self.to.joints is None and not self.to.gives_pose,
+            "it leaves open where it ends": not self.to.gives_joints_or_pose,
             "its `minimum_duration` is given": self.minimum_duration is not None,
             "its joints arrive one by one (`synchronize: none`)": self.synchronize == "none",
             "it brings its start inside the limits first (`brake`)": self.brake,
