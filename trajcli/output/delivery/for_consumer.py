@@ -44,6 +44,7 @@ _SLACK = 1e-6  # relative: what a joined curve may be above a limit
 _COARSE = 0.05  # of a limit: what decimals alone may make up between knots
 _PERIODS = 200  # periods by which a motion is stretched as a whole, one after the other
 _FEW_PERIODS = 32  # likewise, where nothing else was found
+_BY_RULE = 3.0  # times a limit of a rule: what passes it by more is a step, as of a start in motion
 _LONGER = 1e-9  # relative: a duration that differs by less is the same
 
 
@@ -270,6 +271,7 @@ class _Search:
         joined, rules = rows.judgement(slack=_SLACK), None
         if by_rules or joined is None or not any(finding.limit for finding in joined.findings):
             rules = judge_as_written(plan, grid, self._profile, writing.form, digits=digits, log=writing.log)
+            rules = replace(rules, findings=tuple(_in_its_move(found, plan) for found in rules.findings))
         made = replace(made, joined=joined, rules=rules)
         if made.coarse and writing.digits is None:
             return replace(made, digits="full", chosen=True)
@@ -412,6 +414,16 @@ class _Search:
             yield "--rows rate"
         if wanted.align and document.node(("output", "align")) is not None:
             yield "--set output.align=true"
+
+
+def _in_its_move(found: Finding, plan: Plan) -> Finding:
+    """Return a finding of a rule with the move it is in, where rows do not say that and slowness may help."""
+    if found.move is not None or found.time is None or not found.excess < _BY_RULE:
+        return found
+    begins = [span.start for span in plan.trajectory.spans]
+    local = found.time - plan.loaded.job.output.start_time
+    number = max(int(np.searchsorted(begins, local, "right")) - 1, 0)
+    return replace(found, move=plan.trajectory.spans[number].index)
 
 
 def _with_event(made: ForConsumer, kind: str, text: str) -> ForConsumer:
