@@ -150,3 +150,67 @@ def test_the_largest_step_of_velocity_has_its_row_in_blocks_too(row: int) -> Non
     (one,) = judged(replace(rows, q=q), "ros-jtc").findings
     assert (one.joint, one.row) == ("joint_5", row + 1)
     assert one.value == pytest.approx(0.08)
+
+
+@pytest.mark.parametrize("profile", ["franka-fr3", "franka-fer"])
+def test_where_rows_are_jumped_to_the_time_of_the_first_one_is_no_matter(profile: str) -> None:
+    around = Surroundings(
+        FRANKA.joints, STILL[0] + 0.01 * np.eye(7)[4], Limits(*[np.tile([-9.0, 9.0], (7, 1))] * 4)
+    )
+    for begins in (0.0, 2.0):
+        every = judge_by_profile(
+            [replace(FRANKA, t=FRANKA.t + begins)], load_profile(profile), around
+        ).findings
+        (one,) = [each for each in every if each.rule.endswith("-start")]
+        assert (one.kind, one.joint, one.value) == ("start", "joint_5", pytest.approx(-0.01))
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.2, True)])
+def test_stamps_of_few_digits_are_as_rough_as_they_are_large(share: float, broken: bool, side: float) -> None:
+    """At 100 s a ten millionth of it, of both stamps of an interval."""
+    rough = replace(FRANKA.resolution, relative_time=1e-7)
+    t = 100.0 + FRANKA.t
+    t[10:] += side * share * 2 * 1e-7 * 100.0
+    assert bool(found(replace(FRANKA, t=t, resolution=rough), "franka-fr3", "fr3-period")) == broken
+
+
+@pytest.mark.parametrize(("off", "noted"), [(0.5e-9, False), (5e-9, True)])
+def test_a_thousandth_of_a_unit_is_no_part_of_a_duration(off: float, noted: bool) -> None:
+    rows = motion(6, 0.1, 21)
+    t = rows.t.copy()
+    t[10:] += off
+    assert bool(found(replace(rows, t=t), "ur-passthrough", "passthrough-whole-microseconds")) == noted
+
+
+@pytest.mark.parametrize("name", ["franka-fr3", "ros-jtc", "ur-servoj", "ur-passthrough"])
+def test_every_rule_of_a_profile_is_judged_alone_as_among_the_others(name: str) -> None:
+    """The last one, too: rows in which all that can be wrong is wrong somewhere."""
+    joints = 6 if name.startswith("ur") else 7
+    rows = motion(joints, 0.0123, 41)
+    rng = np.random.default_rng(1)
+    wrong = replace(
+        rows,
+        t=np.round(rows.t * 3e4, 3) % 7e3,
+        q=rows.q + rng.normal(size=rows.q.shape) * 900,
+        qd=rng.normal(size=rows.q.shape) * 3e3,
+        tau=rng.normal(size=rows.q.shape) * 900,
+    )
+    profile, around = load_profile(name), Surroundings(rows.joints, rows.q[0] + 1.0)
+    every = {each.rule for each in judge_by_profile([wrong], profile, around).findings}
+    for rule in profile.rules:
+        alone = judge_by_profile([wrong], replace(profile, rules=(rule,)), around)
+        assert {each.rule for each in alone.findings} == {rule.id} & every
+    assert every
+
+
+@pytest.mark.parametrize(("share", "broken"), [(0.99, False), (1.01, True)])
+@pytest.mark.parametrize("joint", [0, 6])
+def test_decimals_that_make_more_jerk_than_a_share_of_its_limit_are_too_few(
+    joint: int, share: float, broken: bool
+) -> None:
+    """Third differences of positions that are off by h are off by 8 h over 1e-9 s^3; 25 rad/s^3 are allowed."""
+    half = np.zeros(7)
+    half[joint] = share * 25.0 * 1e-9 / 8.0
+    rough = replace(FRANKA.resolution, q=half)
+    assert bool(found(replace(FRANKA, resolution=rough), "franka-fr3", "fr3-decimals")) == broken

@@ -134,6 +134,8 @@ ONE_TERM = {
         [[0.02, 0.0], [0.0, 0.0], [0.0, 0.2]],
     ),
     "a slide on a turning arm": (arm(ACROSS, SLIDE), [[0.0, 0.0], [0.5, 4.0], [0.0, 0.0]]),
+    "a short lever": (arm(("revolute", 0.01, 0.0)), [[0.0], [2.0], [0.3]]),
+    "a slide that carries a lever": (arm(SLIDE, LEVER), [[0.0, 0.0], [2.0, 0.1], [0.0, 0.3]]),
     "a short slide on a turning arm": (arm(ACROSS, SLIDE), [[0.0, 0.0], [3.0, 0.2], [0.0, 0.0]]),
     "a slide that travels far and turns": (arm(ACROSS, SLIDE), [[0.0, 0.0], [3.0, 20.0], [0.0, 0.01]]),
 }
@@ -246,3 +248,12 @@ def test_each_measure_of_a_zone_counts_alone_and_grows_with_it():
         shares = ZoneAround(around, np.zeros(2), zone).shares(joints)
         assert shares == pytest.approx(used)
         assert ZoneAround(around, np.zeros(2), zone.scaled(2.0)).shares(joints) == pytest.approx(shares / 2)
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_a_motion_that_is_furthest_out_where_it_begins_or_ends_says_so(back):
+    row = [[0.9], [-1.2]] if not back else [[0.9], [-0.3]]  # from -1.2 to -0.3, or from -0.3 to 0.6
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.array(row)[:, None, :])
+    share, when = ZoneAround(arm(LEVER), np.zeros(1), Zone(orientation=0.5)).largest_share(curve)
+    assert share == pytest.approx(1.2 / 0.5 if not back else 0.6 / 0.5, rel=1e-6)
+    assert when == (1.0 if back else 0.0)

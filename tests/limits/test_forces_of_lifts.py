@@ -94,6 +94,7 @@ def test_what_gravity_alone_exceeds_no_duration_helps(joint: int, side: float) -
     assert survey is not None
     (found,) = survey.over(robot)
     assert found.factor is None
+    assert [each.time for each in survey.over(robot, 0.0)] == [found.time]
     held = survey.held_over()
     assert held is not None
     assert (held[0], held[1]) == (joint, side * 40.0)
