@@ -46,6 +46,12 @@ def problems(text: str) -> list[tuple[int, str]]:
         ),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "mark: here", 5, "a move has a `label`"),
         ("planner: cubic, to: {joints: [1]}, duration: 1", "gripper: 1", 5, "attach and detach"),
+        (
+            "{planner: cubic, to: {joints: [1]}, duration: 1}",
+            "{repeat: 2, zone: 0.1, moves: [{planner: cubic, to: {joints: [1]}, duration: 1}]}",
+            5,
+            "`zone` stands in the moves, in each that it is for",
+        ),
         ("duration: 1", "duration: 1, io: 4", 5, "`at: {signal: NAME, value: 1}` in the move before"),
         (
             "cubic, to: {joints: [1]}",

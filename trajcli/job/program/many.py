@@ -22,6 +22,8 @@ _NAMING = ("to", "via", "center", "line", "in", "from", "frame")
 """Keys whose text names a point or a frame; so do the texts of a list under `through`."""
 _OTHER_TEXTS = ("euler", "configuration", "label", "planner", "signal", "tool")
 
+_OF_MOVES = ("zone", "law", "limits", "at", "duration", "tolerance", "orientation", "approach", "retreat")
+"""Keys of moves, which no repeat has."""
 _Path = tuple[str | int, ...]
 Rounds = Mapping[str, int]
 """Which of the many a name means, from 0, by name."""
@@ -298,6 +300,8 @@ class ManyNames:
         for key in node.value:
             if key not in keys:
                 hint = did_you_mean(key, keys) or valid_names(keys)
+                if key in _OF_MOVES and "moves" in keys:
+                    hint = f"`{key}` stands in the moves, in each that it is for"
                 raise self.refused(f"unknown key '{key}'", (*path, key), hint, key=True)
 
 
