@@ -113,3 +113,18 @@ def test_a_straight_way_is_bounded_by_the_motion_that_leaves_points_out():
     duration, joint = shortest_duration(problem([0.0, 0.4, 1.0, 2.0], np.zeros((2, 1, 2))))
     assert joint == 0
     assert duration == pytest.approx(fastest((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)), rel=1e-8)
+
+
+@pytest.mark.parametrize("shift", [3.0, -2.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_where_the_points_stand_is_no_matter_and_a_straight_way_is_as_ruckig_goes(sign, shift):
+    """One joint over 1.2 with a point in between, from a motion backward: only the way as a whole sees that one."""
+    begin, end = (0.0, -0.3 * sign, 0.0), (1.2 * sign, 0.0, 0.0)
+    least = fastest(begin, end)
+    points = sign * np.array([0.0, 0.5, 1.2])
+    states = [[[-0.3 * sign, 0.0]], [[0.0, 0.0]]]
+    for by in (0.0, shift):
+        bound, joint = shortest_duration(problem(points + by, states))
+        assert joint == 0
+        assert bound <= least
+        assert bound == pytest.approx(least, rel=1e-8)
