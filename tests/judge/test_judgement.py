@@ -1,0 +1,86 @@
+"""What a judgement says as a whole: by severity and certainty, the worst first, and of rows of a verified motion."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from typing import Any
+
+import pytest
+
+from trajcli.findings import Finding
+from trajcli.judge.judgement import Judgement, as_planned, worst_first
+
+
+def finding(value: float = 2.0, **fields: Any) -> Finding:
+    given: dict[str, Any] = {"kind": "velocity", "joint": "j1", "limit": 1.0, "time": 0.5, "message": "fast"}
+    return Finding(**{**given, "value": value, **fields})
+
+
+WARNING = finding(severity="warning")
+ROUNDED = finding(certainty="within rounding")
+CERTAIN = finding()
+
+
+@pytest.mark.parametrize(
+    ("found", "verdict", "errors"),
+    [
+        ((), "satisfied", 0),
+        ((WARNING,), "satisfied", 0),
+        ((ROUNDED,), "within rounding", 0),
+        ((CERTAIN,), "exceeded", 1),
+        ((WARNING, ROUNDED), "within rounding", 0),
+        ((WARNING, ROUNDED, CERTAIN, CERTAIN), "exceeded", 2),
+        ((finding(severity="warning", certainty="within rounding"), WARNING), "satisfied", 0),
+    ],
+)
+def test_errors_make_the_verdict_and_the_certain_ones_fail(found, verdict, errors) -> None:
+    for order in permutations(found):
+        judgement = Judgement(order, "linear", 3)
+        assert judgement.verdict == verdict
+        assert judgement.passed == (verdict != "exceeded")
+        assert len(judgement.errors) == errors
+
+
+def test_the_worst_comes_first() -> None:
+    far, later = finding(3.0), finding(2.0, time=0.9)
+    order = (far, CERTAIN, later, ROUNDED, WARNING)
+    for mixed in permutations(order):
+        assert worst_first(mixed) == order
+
+
+def planned(*found: Finding) -> Judgement:
+    judgement = as_planned(Judgement(found, "cubic", 9), 1e-5)
+    assert judgement.planned_rows is True
+    assert judgement.verdict == "satisfied"
+    return judgement
+
+
+@pytest.mark.parametrize(("value", "told"), [(1 + 2e-5, True), (1 + 0.5e-5, False), (-1 - 2e-5, True)])
+def test_what_joined_rows_of_a_verified_motion_pass_is_a_warning_and_an_event(
+    value: float, told: bool
+) -> None:
+    judgement = planned(finding(value, limit=1.0 if value > 0 else -1.0, rule="limit"))
+    assert [each.severity for each in judgement.findings] == ["warning"] * told
+    assert len(judgement.events) == told
+    assert all(event.startswith("joined_over_limit") for event in judgement.events)
+
+
+@pytest.mark.parametrize("rule", ["continuity", "derivative", "time"])
+def test_rows_of_a_verified_motion_have_no_jumps_whatever_their_rate(rule: str) -> None:
+    assert planned(finding(rule=rule)).findings == ()
+    assert planned(finding(rule=rule, severity="warning")).findings != ()
+
+
+def test_what_rounding_explains_of_a_verified_motion_is_nothing() -> None:
+    assert planned(finding(rule="limit", certainty="within rounding")).findings == ()
+
+
+def test_the_worst_of_what_is_passed_is_named() -> None:
+    tool = finding(3.0, rule="limit", kind="tool_speed", joint=None)
+    (event,) = planned(finding(rule="limit"), tool).events
+    assert event.endswith("pass the limit of the speed of the tool, by a factor of 3")
+    (event,) = planned(finding(rule="limit")).events
+    assert event.endswith("pass the limit of the velocity of j1, by a factor of 2")
+    (event,) = planned(finding(rule="path", kind="deviation", joint=None)).events
+    assert "pass the tolerance of the path of the tool" in event
+    assert planned(finding(rule="state", kind="start")).events == ()
