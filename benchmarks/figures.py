@@ -101,7 +101,9 @@ class Figure:
             return value, f"{self.goal / MEGABYTE:+.0f} MB"
         if self.kind == "seconds":
             return _seconds(self.value), _seconds(self.goal)
-        return "-" if self.value is None else f"{self.value:.2f}", f"{self.goal:.2f}"
+        digits = 2 if self.goal >= 0.1 else 3  # a goal of 0.015 shows all of them
+        value = "-" if self.value is None else f"{self.value:.{digits}f}"
+        return value, f"{self.goal:.{digits}f}"
 
 
 def _seconds(amount: float | None) -> str:
