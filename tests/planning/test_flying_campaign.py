@@ -94,6 +94,11 @@ def test_a_random_program_with_zones_keeps_all_that_is_said_of_it(part: int) -> 
     assert figures["fly"] >= 0.7 * len(seeds)
 
 
+def test_a_joint_that_comes_back_as_it_went_does_not_end_the_process() -> None:
+    """In its zone ruckig 0.19 was asked for a way of 0 from a speed to nearly the opposite one, and crashed."""
+    assert campaign([65])["programs"] == 1
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("block", range(40))
 def test_ten_thousand_programs_with_zones(block: int, tally: Tally) -> None:

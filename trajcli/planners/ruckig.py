@@ -29,6 +29,7 @@ from trajcli.planners.planner import Phase
 
 Control = Literal["position", "velocity"]
 
+_ALIKE = 1e-3  # relative: speeds there and back that are the same for ruckig, next to rest
 _STILL = 1e-9  # of the peak velocity: less counts as rest
 
 
@@ -425,6 +426,8 @@ def _call_ruckig(
     if duration is not None:
         wanted.minimum_duration = max(duration - waited, 0.0) / time_unit
     answer = ruckig.Trajectory(1)
+    if _comes_back_as_it_went(problem):
+        return None
     try:
         result = ruckig.Ruckig(1).calculate(wanted, answer)
     except (ruckig.RuckigError, ValueError):
@@ -443,6 +446,14 @@ def _lead(problem: BoundaryProblem) -> PhaseChain | None:
     phases = braking(*problem.initial[1:], problem.bounds).phases
     initial = (0.0, *problem.initial[1:])[: problem.order]
     return PhaseChain(initial, (math.nan,) * len(initial), *_apart(phases))
+
+
+def _comes_back_as_it_went(problem: BoundaryProblem) -> bool:
+    """Return whether a variable is back where it was, as fast, with the same acceleration: ruckig crashes."""
+    if problem.control != "position" or problem.displacement or not problem.initial[2]:
+        return False
+    speeds = problem.initial[1], problem.final[1]
+    return problem.initial[2] == problem.final[2] and abs(speeds[0] + speeds[1]) <= _ALIKE * abs(speeds[0])
 
 
 def _inside(value: float, lower: float, upper: float) -> float:

@@ -29,7 +29,7 @@ from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
 _HOPELESS = 1.3  # times a limit after the first steps of a law between states
-_LONGER = (2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
+_LONGER = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
 _SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
 _BACKWARD = 1e-9  # of the length: a law that goes back by less stands still
 
@@ -226,7 +226,7 @@ def _slow_quintics(problems: Sequence[BoundaryProblem]) -> list[PiecewisePolynom
 
     They lead from rest to next to rest, where numbers are too small for phases of constant jerk.
     """
-    longest = max(fastest(problem).duration for problem in problems)
+    longest = max(_least_duration(problem) for problem in problems)
     for longer in _LONGER:
         curves = [_quintic(problem, longer * longest) for problem in problems]
         extremes = [peaks(curve, (1, 2, 3)) for curve in curves]
@@ -237,6 +237,15 @@ def _slow_quintics(problems: Sequence[BoundaryProblem]) -> list[PiecewisePolynom
         ):
             return curves
     return None
+
+
+def _least_duration(problem: BoundaryProblem) -> float:
+    """Return the fastest duration of a joint; where none is known, that at the acceleration that it has."""
+    try:
+        return fastest(problem).duration
+    except PlanningError:
+        (_, before, change), (_, behind, _) = problem.initial, problem.final
+        return abs(behind - before) / abs(change) if change else 0.0
 
 
 def _hardly_moves(problem: BoundaryProblem) -> bool:
