@@ -138,7 +138,8 @@ def check_file(
     judgement = judge_motion(blocks, requirements)
     of_tool, read = _of_tool_columns(opened, options, given, motion, by_time, planned=requirements.planned)
     judgement = replace(judgement, findings=worst_first([*judgement.findings, *of_tool]))
-    unread = note_of_unread([name for name in motion.unread if name not in read])
+    of_none = [name for name in motion.unread if name not in read and not requirements.planned]
+    unread = note_of_unread(of_none)
     of_motion = [note for note in motion.notes if note not in note_of_unread(motion.unread)]
     notes = (*of_motion, *unread, *given.notes, *judgement.notes)
     if given.loaded is not None and "move" not in motion.quantities and by_time is None:
