@@ -3,35 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
+from line_of_ur5e import JOB, plan
 from recorded_rows import part
 
 import trajcli
-from trajcli.api.plans import PlannedJob
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.recorded_tool import ToolJudge
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
-JOB = {
-    "version": 1,
-    "robot": "ur5e",
-    "limits": {"acceleration": 20.0},
-    "start": {"joints": [0.2, -1.2, 1.6, -1.0, -1.3, 0.4]},
-    "moves": [
-        {"planner": "line", "to": {"xyz": [0.45, 0.25, 0.35]}, "law": {"shape": "quintic", "duration": 2}}
-    ],
-}
 PERIOD = 4e-3
-
-
-@cache
-def plan() -> PlannedJob:
-    return trajcli.plan(JOB)
 
 
 def recorded(decimals: int = 9) -> RecordedMotion:

@@ -11,9 +11,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from line_of_ur5e import plan
 
 import trajcli
-from trajcli.api.plans import PlannedJob
 from trajcli.columns import parse_column
 from trajcli.findings import Finding
 from trajcli.judge.motion import Requirements, judge_motion
@@ -143,21 +143,6 @@ def test_an_acceleration_of_the_tool_between_dense_rows_is_a_warning(key: str, a
 
 
 # --- along a path ---
-
-JOB = {
-    "version": 1,
-    "robot": "ur5e",
-    "limits": {"acceleration": 20.0},
-    "start": {"joints": [0.2, -1.2, 1.6, -1.0, -1.3, 0.4]},
-    "moves": [
-        {"planner": "line", "to": {"xyz": [0.45, 0.25, 0.35]}, "law": {"shape": "quintic", "duration": 2}}
-    ],
-}
-
-
-@cache
-def plan() -> PlannedJob:
-    return trajcli.plan(JOB)
 
 
 @cache

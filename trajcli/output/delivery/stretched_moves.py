@@ -45,7 +45,7 @@ class StretchedMoves:
             for move in moves
             if fit and move is not None and move.at_rest and not move.robot.limits.has_effort
         ]
-        self._rate, self._interpolation = rate, rows.interpolation
+        self._rate, self._interpolation = rate, rows.interpolation or "linear"  # without one no move fits
         self._over: dict[tuple[int, int], bool] = {}
 
     def are_over(self, factor: float) -> bool:
@@ -68,7 +68,6 @@ class StretchedMoves:
     def _is_over(self, move: PlannedMove) -> bool:
         """Return whether the curve that joins rows is over a limit where a break of the planned one lies."""
         curve, period = move.planned.curve, 1.0 / self._rate
-        assert self._interpolation is not None  # noqa: S101
         stated = _STATED[self._interpolation]
         in_periods = curve.breaks * self._rate
         inside = np.unique(np.floor(in_periods[np.abs(in_periods - np.rint(in_periods)) > _ON_ROW]))
