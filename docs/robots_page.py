@@ -6,7 +6,8 @@ import json
 from typing import Any
 
 from docs.markdown import table
-from trajcli.job.robot import CATALOGUE, RobotSheet, catalogue_names, read_sheet
+from trajcli.catalogue.entries import catalogue_names
+from trajcli.job.robot import RobotSheet, load_sheet
 from trajcli.queries.catalogue_list import IN_INDEX, INDEX, checksum, rows_of_files
 from trajcli.queries.robot_card import robot_row
 
@@ -52,7 +53,7 @@ def index_text() -> str:
 
 def robots_page() -> str:
     """Return the page of the catalogue."""
-    sheets = [(name, read_sheet(str(CATALOGUE / f"{name}.yaml"))) for name in catalogue_names()]
+    sheets = [(name, load_sheet(name)) for name in catalogue_names()]
     rows = [(robot_row(name, sheet), sheet) for name, sheet in sheets]
     real = [(row, sheet) for row, sheet in rows if row["origin"] == "real"]
     book = [(row, sheet) for row, sheet in rows if row["origin"] == "textbook"]

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from trajcli.api.motions import Motion, batch, plot, resample, retime, sweep, view
     from trajcli.api.plans import Arm, InverseSolution, PlannedJob, check, load_robot, plan
+    from trajcli.catalogue.entries import catalogue_names
     from trajcli.checks.verify import Verdict
     from trajcli.curves.piecewise import PiecewisePolynomial
     from trajcli.errors import (
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from trajcli.job.model import Job
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
-    from trajcli.job.robot import catalogue_names
     from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
     from trajcli.output.report import report_of, verification_error
@@ -66,7 +66,7 @@ _HOMES = {
     "trajcli.job.model": ("Job",),
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
-    "trajcli.job.robot": ("catalogue_names",),
+    "trajcli.catalogue.entries": ("catalogue_names",),
     "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
     "trajcli.api.motions": ("Motion", "batch", "plot", "resample", "retime", "sweep", "view"),

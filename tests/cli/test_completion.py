@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from running import call, warm
 
-from trajcli.job.robot import catalogue_names
+from trajcli.catalogue.entries import catalogue_names
 
 
 def completed(*words: str) -> list[str]:

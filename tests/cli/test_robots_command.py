@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from arm_calls import Arms
 from tiers import few
-from yaml_files import read_yaml
 
-from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
+from trajcli.catalogue.entries import catalogue_names, robot_file
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.queries import catalogue_list
 
@@ -74,7 +75,7 @@ def test_the_list_says_the_units_of_each_file(arms):
     head, *lines = out.splitlines()
     start, end = head.index("units"), head.index("origin")
     for row, line in zip(arms.json("robots"), lines, strict=True):
-        units = read_yaml(CATALOGUE / f"{row['name']}.yaml")["units"]
+        units = yaml.load(robot_file(row["name"]), Loader=yaml.CSafeLoader)["units"]
         assert line[start:end].strip() == f"{units['angle']}, {units['length']}"
         assert line[start - 2 : start] == line[end - 2 : end] == "  "
         assert row["units"] == units
@@ -196,7 +197,7 @@ def test_the_file_to_start_from_is_the_same_robot(arms, name, tmp_path):
     code, out, _ = arms.call("robots", name, "--yaml")
     (tmp_path / "mine.yaml").write_text(out)
     assert code == 0
-    assert out == (CATALOGUE / f"{name}.yaml").read_text("utf-8")
+    assert out == robot_file(name)
     q = np.full(len(load_robot(name).joints), 0.3)
     assert forward(load_robot(tmp_path / "mine.yaml"), q).tolist() == forward(load_robot(name), q).tolist()
 

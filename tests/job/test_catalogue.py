@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from yaml_files import read_yaml
 
+from trajcli.catalogue.entries import catalogue_names, robot_file
 from trajcli.errors import FileError, InputError
 from trajcli.job.read import job_from_text
-from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 
 ORACLES = Path(__file__).parents[1] / "oracles"
@@ -182,7 +184,7 @@ def test_joint_names_of_the_ur5e_are_those_of_its_description() -> None:
 
 @pytest.mark.parametrize("name", [*REAL, *sorted(BOOK)])
 def test_sources_are_named(name: str) -> None:
-    plain = read_yaml(CATALOGUE / f"{name}.yaml")
+    plain = yaml.load(robot_file(name), Loader=yaml.CSafeLoader)
     assert plain["source"]
     assert plain["licence"]
     assert plain["note"]

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from yaml_files import read_yaml
 
+from trajcli.catalogue.entries import catalogue_names
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.job.robot import catalogue_names, load_robot, load_sheet
+from trajcli.job.robot import load_robot, load_sheet
 from trajcli.urdf.joint_properties import LEAST_PLACEHOLDER_EFFORT
 from trajcli.urdf.serial_robot import robot_of_urdf
 from trajcli.urdf.write import urdf_of

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from trajcli.api.plans import load_robot
+from trajcli.catalogue.entries import catalogue_names
 from trajcli.job import robot as robots
 
 ROBOT = "joints: [{velocity: 1}, {velocity: 2}]\n"
@@ -47,4 +48,4 @@ def test_what_one_computes_of_its_robot_is_not_in_another(parsed: list[str]) -> 
 
 
 def test_all_robots_of_the_catalogue_are_kept() -> None:
-    assert robots._sheet_of.cache_info().maxsize > len(robots.catalogue_names())
+    assert robots._sheet_of.cache_info().maxsize > len(catalogue_names())

@@ -11,17 +11,17 @@ from hypothesis import HealthCheck, given, settings
 from jsonschema import Draft202012Validator
 from random_mappings import jobs
 
+from trajcli.catalogue.entries import catalogue_names, robot_file
 from trajcli.cli.init import STARTER
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
-from trajcli.job.robot import CATALOGUE
 from trajcli.job.schema import SchemaKind, schema_of, schema_text
-from trajcli.job.yaml.load import read_document
+from trajcli.job.yaml.load import parse_document, read_document
 from trajcli.planners import HANDLING, PLANNERS
 
 ROOT = Path(__file__).parents[2]
 JOBS = [*sorted((ROOT / "examples").glob("*.yaml")), STARTER]
-ROBOTS = [*sorted(CATALOGUE.glob("*.yaml")), *sorted((ROOT / "examples/robots").glob("*.yaml"))]
+ROBOTS = sorted((ROOT / "examples/robots").glob("*.yaml"))
 KINDS: tuple[SchemaKind, ...] = get_args(SchemaKind)
 VALIDATORS = {kind: Draft202012Validator(schema_of(kind)) for kind in KINDS}
 
@@ -61,6 +61,11 @@ def test_robots_are_accepted(path: Path) -> None:
     assert flaws("robot", read_document(str(path)).plain()) == []
 
 
+@pytest.mark.parametrize("name", catalogue_names())
+def test_robots_of_the_catalogue_are_accepted(name: str) -> None:
+    assert flaws("robot", parse_document(robot_file(name).encode(), name).plain()) == []
+
+
 def test_there_is_an_example_for_each_planner() -> None:
     moves = [move for path in JOBS[:-1] for move in read_document(str(path)).plain()["moves"]]
     used = {move.get("planner") or next(iter(move)) for move in moves}
@@ -72,7 +77,6 @@ def test_there_is_an_example_for_each_planner() -> None:
 def test_random_mappings_are_accepted_as_the_reader_does(plain: dict[str, Any]) -> None:
     loaded = job_from_text(json.dumps(plain, ensure_ascii=False))
     assert flaws("job", plain) == []
-    from trajcli.job.yaml.load import parse_document
 
     assert flaws("job", parse_document(dump_job(loaded), "resolved").plain()) == []
 

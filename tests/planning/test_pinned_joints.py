@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from tiers import few
 
+from trajcli.catalogue.entries import catalogue_names, robot_file
 from trajcli.errors import InputError, TrajcliError
 from trajcli.job.dump import dump_job
 from trajcli.job.read import files_of, job_from_text, load_job
-from trajcli.job.robot import CATALOGUE, catalogue_names, load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.pinned_joints import without_pinned
 from trajcli.kinematics.inverse.solve import solve
@@ -288,7 +289,7 @@ def test_wrong_rails_are_refused_where_they_are_wrong(robot: Any, message: str) 
 
 
 def test_the_file_of_an_arm_on_a_rail_is_one_of_the_files_of_the_job(tmp_path: Path) -> None:
-    (tmp_path / "arm.yaml").write_text((CATALOGUE / "irb4600.yaml").read_text())
+    (tmp_path / "arm.yaml").write_text(robot_file("irb4600"))
     robot = {"rail": RAIL, "arm": {"file": "arm.yaml"}}
     (tmp_path / "job.yaml").write_text(
         json.dumps({**HEAD, "robot": robot, "moves": [go(joints={"rail": 1})]})

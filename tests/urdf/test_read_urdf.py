@@ -13,7 +13,8 @@ from independent_reader import ReadBack
 from scipy.spatial.transform import Rotation
 from tiers import few
 
-from trajcli.job.robot import catalogue_names, load_robot
+from trajcli.catalogue.entries import catalogue_names
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.jacobian import jacobian

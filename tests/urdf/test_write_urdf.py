@@ -10,9 +10,10 @@ import pytest
 from independent_reader import ReadBack
 from scipy.spatial.transform import Rotation
 
+from trajcli.catalogue.entries import catalogue_names
 from trajcli.cli.app import app
 from trajcli.errors import InputError
-from trajcli.job.robot import catalogue_names, load_robot
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Limits, Robot, unlimited
 from trajcli.urdf.chain import chain_of

@@ -9,10 +9,9 @@ import typer
 
 def robot_names(incomplete: str) -> list[str]:
     """Return the names of the catalogue that begin so, for the shell; no robot is read for that."""
-    from pathlib import Path
+    from trajcli.catalogue.entries import catalogue_names
 
-    folder = Path(__file__).parent.parent / "catalogue"
-    return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+    return [name for name in catalogue_names() if name.startswith(incomplete)]
 
 
 def profile_words(incomplete: str) -> list[str]:

@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from trajcli.urdf.serial_robot import UrdfRobot
 
 M = TypeVar("M", bound=Model)
-CATALOGUE = Path(__file__).parent.parent / "catalogue"
 
 _URDF_ENDINGS = (".urdf", ".xacro", ".xml")
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
@@ -250,11 +249,6 @@ class RobotSheet:
     concessions: tuple[tuple[str, str], ...] = ()
 
 
-def catalogue_names() -> list[str]:
-    """Return the names of the robots that come with trajcli."""
-    return sorted(path.stem for path in CATALOGUE.glob("*.yaml"))
-
-
 def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # noqa: ANN401
     """Return the sheet of the robot that stands under `robot` in a job.
 
@@ -275,10 +269,8 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
         from trajcli.job.messages import no_robot
 
         raise InputError(no_robot(value, document))
-    if "joints" not in value and value.get("name") in catalogue_names():
-        from trajcli.job.messages import named_with_more
-
-        raise InputError(named_with_more(value, document))
+    if "joints" not in value:
+        _check_not_of_catalogue(value, document)
     for key in value:
         place = document.place(("robot", key), key=True)
         if key == "units":
@@ -293,6 +285,16 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
                 raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
     robot = _validated(value, document, ("robot",), units, RobotModel).as_robot()
     return RobotSheet(robot, units, None, None, None, None)
+
+
+def _check_not_of_catalogue(value: Mapping[str, Any], document: Document) -> None:
+    """Refuse the name of a robot of the catalogue with anything beside it."""
+    from trajcli.catalogue.entries import catalogue_names
+
+    if value.get("name") in catalogue_names():
+        from trajcli.job.messages import named_with_more
+
+        raise InputError(named_with_more(value, document))
 
 
 def _from_entry(value: Mapping[str, Any], document: Document, units: Units) -> RobotSheet:
@@ -326,12 +328,13 @@ def load_sheet(name: str | Path) -> RobotSheet:
         InputError: When the catalogue has no such robot, or with every flaw of the file.
         FileError: When the file cannot be read.
     """
-    names = catalogue_names()
-    if str(name) in names:
-        return read_sheet(str(CATALOGUE / f"{name}.yaml"))
+    from trajcli.catalogue.entries import catalogue_names, nearest_robots
+
+    if str(name) in catalogue_names():
+        return _sheet_of_catalogue(str(name))
     if isinstance(name, Path) or _looks_like_a_path(name) or is_urdf(name):
         return read_sheet(str(name))
-    raise InputError(f"the catalogue has no robot '{name}'", hint=_suggestion(name, names))
+    raise InputError(f"the catalogue has no robot '{name}'", hint=nearest_robots(name))
 
 
 def is_urdf(path: str | Path) -> bool:
@@ -390,12 +393,12 @@ def read_sheet(path: str) -> RobotSheet:
             return urdf_sheet(path, read_urdf(path))
         except InputError as error:
             raise error.located(place=Place(path, 1, 1)) from None
-    sheet = _sheet_of(read_bytes(path), STDIN if path == "-" else path)
+    sheet = _sheet_of(read_bytes(path), STDIN if path == "-" else path, own_efforts=True)
     return replace(sheet, robot=replace(sheet.robot))  # of its own: a robot keeps what was computed of it
 
 
 @lru_cache(maxsize=256)
-def _sheet_of(content: bytes, path: str) -> RobotSheet:
+def _sheet_of(content: bytes, path: str, *, own_efforts: bool) -> RobotSheet:
     """Return the sheet of a robot file's content: many jobs of one process read it once."""
     document = parse_document(content, path)
     plain = document.plain()
@@ -408,8 +411,8 @@ def _sheet_of(content: bytes, path: str) -> RobotSheet:
     text = "\n".join(document.lines)
     said = (model.source, model.licence, model.note, text, model.maker, model.origin, model.date)
     # numbers that nobody has looked at count where a job asks for them
-    of_others = Path(path).parent == CATALOGUE or is_urdf(model.source or "")
-    return RobotSheet(model.as_robot(efforts=not of_others), units, *said)
+    own_efforts = own_efforts and not is_urdf(model.source or "")
+    return RobotSheet(model.as_robot(efforts=own_efforts), units, *said)
 
 
 def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet:
@@ -440,25 +443,26 @@ def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet
         raise error.located(place=document.place(("robot", *(fields[0] if fields else ("urdf",))))) from None
 
 
+def _sheet_of_catalogue(name: str) -> RobotSheet:
+    """Return the sheet of a robot of the catalogue, whose efforts nobody has looked at."""
+    from trajcli.catalogue.entries import robot_file
+
+    sheet = _sheet_of(robot_file(name).encode(), f"{name}.yaml", own_efforts=False)
+    return replace(sheet, robot=replace(sheet.robot))
+
+
 def _from_catalogue(name: str, document: Document) -> RobotSheet:
-    names = catalogue_names()
-    if name in names:
-        return read_sheet(str(CATALOGUE / f"{name}.yaml"))
-    hint = f"a file is named by {{file: {name}}}" if _looks_like_a_path(name) else _suggestion(name, names)
+    from trajcli.catalogue.entries import catalogue_names, nearest_robots
+
+    if name in catalogue_names():
+        return _sheet_of_catalogue(name)
+    hint = f"a file is named by {{file: {name}}}" if _looks_like_a_path(name) else nearest_robots(name)
     hint = f"a URDF is named by {{urdf: {name}}}" if is_urdf(name) else hint
     raise InputError(Problem(f"the catalogue has no robot '{name}'", hint, document.place(("robot",))))
 
 
 def _looks_like_a_path(name: str) -> bool:
     return "/" in name or "\\" in name or name.endswith((".yaml", ".yml"))
-
-
-def _suggestion(name: str, names: list[str]) -> str:
-    """Return which robots are meant, and how to see all."""
-    from trajcli.suggest import did_you_mean, nearest_names
-
-    near = did_you_mean(name, names) or f"its nearest names are {', '.join(nearest_names(name, names))}"
-    return f"{near}{'' if near.endswith('?') else ';'} `trajcli robots` lists all {len(names)}"
 
 
 def _folder_of(document: Document) -> Path:

@@ -27,10 +27,10 @@ def schema_of(kind: SchemaKind) -> dict[str, Any]:
 
 
 def _job() -> dict[str, Any]:
+    from trajcli.catalogue.entries import catalogue_names
     from trajcli.job.files.rail import RobotOnRail
     from trajcli.job.model import CATALOGUE_NAME, RAIL_DEFINITION, ROBOT_DEFINITION, Job
     from trajcli.job.program.schemas import MOVES_DEFINITION
-    from trajcli.job.robot import catalogue_names
     from trajcli.language.points import RELATIVE_DEFINITION
 
     schema: dict[str, Any] = _without_nulls(Job.model_json_schema())

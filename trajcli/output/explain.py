@@ -33,7 +33,6 @@ from trajcli.job.reports.part import in_units
 from trajcli.kinematics.robot import Robot
 from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals, polynomials_of
 from trajcli.output.report import report_of
-from trajcli.output.sensitivity import with_savings
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.units import Quantity, Units, factor, joint_units
@@ -65,7 +64,11 @@ def explanation(
     units = plan.loaded.units
     wanted = range(len(plan.moves)) if move is None else [move]
     report = report_of(plan, reference=True, peers=reference)
-    report = in_units(with_savings(report, plan, wanted) if sensitivity else report, units)
+    if sensitivity:
+        from trajcli.output.sensitivity import with_savings
+
+        report = with_savings(report, plan, wanted)
+    report = in_units(report, units)
     moves = tuple(_move(plan, index, report.moves[index], derivatives=derivatives) for index in wanted)
     said = {
         name: [part for part in getattr(report, name) if part.move is None or part.move in wanted]

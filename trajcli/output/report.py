@@ -37,19 +37,21 @@ from trajcli.job.report import (
     UncheckedToolReport,
     WaypointReport,
 )
+from trajcli.job.reports.comparisons import AtLimitReport
 from trajcli.job.reports.flyby import FlyByReport, SignalReport
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
-from trajcli.output.sensitivity import at_limit_of
 from trajcli.planners.planner import Event, PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.planning.planned_move import path_of_tool
+from trajcli.planning.sensitivity import times_at_limits
 from trajcli.planning.tightest import tightest_of_move
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import joint_units
 from trajcli.version import __version__
 
 if TYPE_CHECKING:
+    from trajcli.curves.approach import ApproachUse
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.limits.kinds import LimitKind
     from trajcli.limits.tool_bound import SpeedRun, ToolPeak
@@ -178,7 +180,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         mounted=mounted_report(plan, index),
         binding=tightest
         and BindingReport(joint=tightest.joint, quantity=tightest.quantity, used=tightest.used),
-        at_limit=at_limit_of(move, plan.verdict.peaks[index], plan.verdict.by_position[index]),
+        at_limit=_at_limit_of(move, plan.verdict.peaks[index], plan.verdict.by_position[index]),
         waypoints=_waypoints(move, span),
         outside=_outside(move, plan.verdict, index),
         fastest=_fastest(move, span),
@@ -186,6 +188,29 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
         tool_peaks=None if of_tool is None else _tool_peaks(of_tool, span, move.robot),
         **_beside(move, reference=reference, peers=peers),
     )
+
+
+def _at_limit_of(
+    move: PlannedMove, peaks: Sequence[Peaks], uses: Sequence[ApproachUse]
+) -> list[AtLimitReport]:
+    """Return for how long a move is at each of its limits, the longest first.
+
+    Args:
+        move: The move.
+        peaks: Of position and its three derivatives over it.
+        uses: Of its limits of the velocity by position.
+    """
+    names = move.robot.joint_names
+    return [
+        AtLimitReport(
+            joint=names[one.joint],
+            quantity=one.quantity,
+            seconds=one.seconds,
+            share=min(1.0, one.seconds / move.duration),
+            method=one.method,
+        )
+        for one in times_at_limits(move, peaks, uses)
+    ]
 
 
 def _beside(move: PlannedMove, *, reference: bool, peers: bool) -> dict[str, Any]:

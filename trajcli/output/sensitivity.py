@@ -1,4 +1,4 @@
-"""Sensitivity in reports: for how long limits bind, and what higher ones would save."""
+"""Sensitivity in reports: what limits would save that are higher."""
 
 from __future__ import annotations
 
@@ -6,42 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from trajcli.curves.extrema import Peaks
 from trajcli.job.report import MoveReport, Report
-from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
+from trajcli.job.reports.comparisons import SavingReport
 from trajcli.kinematics.robot import QUANTITIES
-from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
-from trajcli.planning.sensitivity import times_at_limits
 
 if TYPE_CHECKING:
-    from trajcli.curves.approach import ApproachUse
     from trajcli.planning.sensitivity import Saving
 
 _NOTHING = 1e-9  # relative to the duration: what rounding leaves of no saving
-
-
-def at_limit_of(
-    move: PlannedMove, peaks: Sequence[Peaks], uses: Sequence[ApproachUse]
-) -> list[AtLimitReport]:
-    """Return for how long a move is at each of its limits, the longest first.
-
-    Args:
-        move: The move.
-        peaks: Of position and its three derivatives over it.
-        uses: Of its limits of the velocity by position.
-    """
-    names = move.robot.joint_names
-    return [
-        AtLimitReport(
-            joint=names[one.joint],
-            quantity=one.quantity,
-            seconds=one.seconds,
-            share=min(1.0, one.seconds / move.duration),
-            method=one.method,
-        )
-        for one in times_at_limits(move, peaks, uses)
-    ]
 
 
 def with_savings(report: Report, plan: Plan, moves: Sequence[int]) -> Report:

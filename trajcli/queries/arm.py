@@ -9,11 +9,12 @@ from typing import Literal
 
 import numpy as np
 
+from trajcli.catalogue.entries import catalogue_names
 from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError
 from trajcli.frozen import comparable, frozen
-from trajcli.job.robot import RobotSheet, catalogue_names, is_urdf, load_sheet
+from trajcli.job.robot import RobotSheet, is_urdf, load_sheet
 from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import Robot

@@ -8,15 +8,14 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
+from trajcli.catalogue.entries import CATALOGUE, catalogue_names
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.suggest import did_you_mean
 
-_FOLDER = Path(__file__).parent.parent / "catalogue"
-INDEX = _FOLDER / "index.json"
+INDEX = CATALOGUE.with_name("index.json")
 """The file of the index, which `make docs` writes."""
 IN_INDEX = ("name", "title", "joints", "kind", "reach", "units", "maker", "origin")
 """What the index says of a robot: what the table shows, and what robots are chosen by."""
@@ -52,16 +51,12 @@ def catalogue_rows() -> list[dict[str, Any]]:
 
 
 def checksum() -> int:
-    """Return a number that other files, or others of their names, hardly have."""
-    total = 0
-    for path in sorted(_FOLDER.glob("*.yaml")):
-        total = zlib.crc32(path.read_bytes(), zlib.crc32(path.name.encode(), total))
-    return total
+    """Return a number that a catalogue with another text hardly has."""
+    return zlib.crc32(CATALOGUE.read_bytes())
 
 
 def rows_of_files() -> list[dict[str, Any]]:
     """Return all that a list says of each robot, of its file: `trajcli.queries.robot_card.robot_row`."""
-    from trajcli.job.robot import catalogue_names
     from trajcli.queries.arm import open_sheet
     from trajcli.queries.robot_card import robot_row
 

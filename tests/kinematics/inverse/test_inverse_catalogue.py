@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.job.robot import catalogue_names, load_robot
+from trajcli.catalogue.entries import catalogue_names
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.solve import solve
