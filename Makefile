@@ -53,8 +53,8 @@ mutants: $(STAMP)  ## mutants of code that proves or judges; FILES='trajcli/judg
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[$(strip $(EXTRAS)),mutants]'
 	$(BIN)/python -m tests.mutants $(foreach pattern,$(FILES),'$(pattern)') --sample $(SAMPLE) --seed $(SEED)
 
-planted: $(STAMP)  ## mutants that somebody wrote, which tests once killed; FILES='trajcli/judge/*': those alone
-	$(BIN)/python -m tests.mutants.planted $(foreach pattern,$(FILES),'$(pattern)')
+planted: $(STAMP)  ## mutants that somebody wrote, which tests once killed; FILES='trajcli/judge/*': those alone; SAMPLE=60: that many
+	$(BIN)/python -m tests.mutants.planted $(foreach pattern,$(FILES),'$(pattern)') --sample $(SAMPLE) --seed $(SEED)
 
 bench: $(STAMP) $(PEERS)/.installed  ## ratios against named peers, in one run; GROUP='planning jerk_limited': these alone
 	$(BIN)/python -m benchmarks $(GROUP) --peers $(PEERS)/bin/python
@@ -99,7 +99,7 @@ release: $(STAMP)  ## the checklist of a release, up to its tag; who owns the pr
 	$(MAKE) schema docs site
 	git diff --exit-code
 	$(MAKE) release-check
-	$(MAKE) mutants SAMPLE=$(if $(filter 0,$(SAMPLE)),5,$(SAMPLE))
+	$(MAKE) planted SAMPLE=$(if $(filter 0,$(SAMPLE)),60,$(SAMPLE))
 	$(MAKE) bench
 	git tag -a v$(VERSION) -m "trajcli $(VERSION)"
 	@grep -q 'address = "https://example.org/' pyproject.toml && \
