@@ -129,6 +129,25 @@ def test_rules_about_seven_joints_are_not_judged_for_six() -> None:
     )
 
 
+@pytest.mark.parametrize("count", [6, 7, 8])
+def test_changes_of_effort_are_judged_where_there_are_as_many_joints(count: int) -> None:
+    """Of a consumer that has a limit for each of seven; efforts jump in each row."""
+    franka = load_profile("franka-fr3")
+    (rule,) = (each for each in franka.rules if each.check == "effort_rate")
+    limits = {**rule.parameters, "limit": [1000.0] * 6 + [1e9]}
+    alone = replace(franka, rules=(replace(rule, parameters=limits),))
+    q = np.zeros((21, count))
+    tau = np.where(np.arange(21)[:, None] % 2, 50.0, -50.0) * np.ones(count)
+    rows = replace(FRANKA, q=q, qd=q, qdd=q, tau=tau, joints=tuple(f"j{k}" for k in range(count)))
+    rows = replace(rows, resolution=replace(FRANKA.resolution, **dict.fromkeys(("q", "qd", "qdd"), q[0])))
+    judgement = judge_by_profile([rows], alone, Surroundings(rows.joints))
+    assert {each.joint for each in judgement.findings} == (
+        {f"j{k}" for k in range(6)} if count == 7 else set()
+    )
+    unjudged = {} if count == 7 else {rule.id: f"it is about 7 joints, and there are {count}"}
+    assert dict(judgement.unjudged) == unjudged
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 @pytest.mark.parametrize("profile", ["franka-fr3", "ros-jtc", "ur-servoj", "ur-passthrough"])
 def test_a_few_rows_at_rest_are_at_rest(profile: str, count: int) -> None:

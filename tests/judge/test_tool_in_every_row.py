@@ -83,19 +83,37 @@ ORDERS = {
 def test_rounding_of_rows_explains_so_much_of_the_tool(
     key: str, piece: int, planted: float, certainty: str
 ) -> None:
-    """The link turns by 1e-3 in one piece, which is off by twice the rounding of the rows; the slide is as rough."""
+    """The link turns by 1e-3 in one piece, which is off by twice the rounding of the rows; the slide is as rough.
+
+    The link moves the tool by its lever and turns it, the slide moves it as far as itself.
+    """
     t = np.array([0.0, 0.3, 0.8, 1.2, 1.9])
     factor, order = ORDERS[key]
     q, still = np.zeros((5, 2)), np.zeros((5, 2))
     q[piece + 1 :, 0] = 1e-3
     share = factor / (t[piece + 1] - t[piece]) ** order
     lever = 1.0 if key.startswith("angular") else LEVER
-    slide = 2 * LEVER * share * 2 * OFF  # of both joints, each at the distance of the arm
-    limit = lever * share * 1e-3 - planted * slide
+    rounding = (1.0 if key.startswith("angular") else LEVER + 1.0) * share * 2 * OFF
+    limit = lever * share * 1e-3 - planted * rounding
     (found,) = of_tool(rows(t, q, still, still, off=OFF), link(**{key: limit}), "quintic")
     assert (found.kind, found.severity, found.certainty) == (f"tool_{key}", "error", certainty)
     assert found.value == pytest.approx(lever * share * 1e-3, rel=1e-4)
-    assert found.rounding == pytest.approx(slide, rel=1e-2)
+    assert found.rounding == pytest.approx(rounding, rel=1e-2)
+
+
+@SIDES
+@pytest.mark.parametrize("key", ["speed", "acceleration", "jerk"])
+def test_rounding_of_a_slide_is_no_smaller_at_a_short_arm(key: str, side: float) -> None:
+    """It goes just as fast as it may; its rows are rounded, and the arm at its end is a centimetre long."""
+    t, (factor, order), still = np.array([0.0, 0.3, 0.8, 1.2, 1.9]), ORDERS[key], np.zeros((5, 2))
+    q = np.zeros((5, 2))
+    q[2:, 1] = side * 1e-3
+    limit = factor / 0.5**order * 1e-3
+    q[1, 1], q[2, 1] = -side * 0.99 * OFF, side * (1e-3 + 0.99 * OFF)
+    robot = link(**{key: limit})
+    short = replace(robot, joints=(replace(robot.joints[0], a=0.01), robot.joints[1]))
+    (found,) = of_tool(rows(t, q, still, still, off=OFF), short, "quintic")
+    assert (found.kind, found.certainty) == (f"tool_{key}", "within rounding")
 
 
 @SIDES
@@ -379,3 +397,71 @@ def test_joints_change_their_branch_where_the_tool_goes_on_as_before(
     steps[jump] = [turn, slide] if turn else [0.01, slide]
     q = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
     assert ToolJudge(link()).changes_branch(q, jump) == smooth
+
+
+def of_wrist(q: np.ndarray, size: int) -> list[Finding]:
+    """Return singularities of a wrist, whose last axis goes along the first one's where its middle joint is at 0."""
+    tilts = (-np.pi / 2, np.pi / 2, 0.0)
+    joints = tuple(Joint(f"q{k}", "revolute", alpha=alpha) for k, alpha in enumerate(tilts))
+    wrist = Robot("wrist", joints, unlimited(3), "standard", np.eye(4), np.eye(4))
+    motion = rows(PERIOD * np.arange(len(q)), q)
+    required = Requirements(wrist, tool=lambda: ToolJudge(wrist))
+    judged = judge_motion(lambda: blocks_of_motion(motion, size), required).findings
+    return [each for each in judged if each.kind == "singularity"]
+
+
+@pytest.mark.parametrize("size", [40, 7])
+@pytest.mark.parametrize("row", [0, 2, 12, 30, 39])
+def test_the_one_row_at_a_singularity_is_found(row: int, size: int) -> None:
+    """Each row is more than a twentieth of a radian from the one before, so that all are looked at."""
+    q = np.zeros((40, 3))
+    q[:, 0] = 0.06 * np.arange(40)
+    q[:, 1] = 0.06 * np.abs(np.arange(40) - row) + 1e-5
+    (found,) = of_wrist(q, size)
+    assert (found.severity, found.row, found.time) == ("warning", row + 1, pytest.approx(PERIOD * row))
+    assert found.value < 1e-3
+
+
+@pytest.mark.parametrize("size", [1200, 100])
+def test_a_slow_arm_that_stays_at_a_singularity_is_found(size: int) -> None:
+    """It moves by a twentieth of a radian in 500 rows, of which no block has as many."""
+    q = np.zeros((1200, 3))
+    q[:, 0] = 1e-4 * np.arange(1200)
+    q[:, 1] = np.maximum(0.06 - 1e-4 * np.arange(1200), 0.0)
+    (found,) = of_wrist(q, size)
+    assert 600 < found.row <= 1002
+    assert found.value < 1e-3
+
+
+@SIDES
+def test_rounding_of_a_turn_counts_three_times_in_the_jerk_of_the_tool(side: float) -> None:
+    """At 4 rad/s: 15/8 of twice the rounding more speed, and its cube: 3 L w^2 of it, beside 60 L of its own jerk."""
+    off, rate, t = 1e-4, 4.0, np.arange(2.0)
+    q, qd = np.zeros((2, 2)), np.zeros((2, 2))
+    q[:, 0], qd[:, 0] = side * (rate * t + 0.99 * off * np.array([-1, 1])), side * rate
+    roundings = Resolution(0.0, np.array([off, 0.0]), np.zeros(2), np.zeros(2))
+    motion = replace(rows(t, q, qd, 0 * q), resolution=roundings)
+    (found,) = of_tool(motion, link(jerk=LEVER * rate**3), "quintic")
+    assert found.value == pytest.approx(
+        LEVER * (rate**3 + (3 * rate**2 * 15 / 4 + 60) * 0.99 * off), rel=1e-4
+    )
+    assert found.certainty == "within rounding"
+
+
+@SIDES
+@pytest.mark.parametrize(("key", "power"), [("speed", 1), ("acceleration", 2), ("jerk", 3)])
+def test_rounding_of_a_slide_that_is_swung_counts_with_its_length(key: str, power: int, side: float) -> None:
+    """A beam that turns 100 times a second or so, and a slide along it, which is a rounding further out."""
+    off, rate, t = 1e-4, 100.0, np.arange(3.0)
+    joints = Joint("turn", "revolute", alpha=np.pi / 2), Joint("out", "prismatic")
+    limits = replace(unlimited(2), tcp=ToolLimits(**{key: 0.5 * rate**power}))
+    beam = Robot("beam", joints, limits, "standard", np.eye(4), np.eye(4))
+    q, qd = np.zeros((3, 2)), np.zeros((3, 2))
+    q[:, 0], q[:, 1], qd[:, 0] = side * rate * t, 0.5 + 0.99 * off, side * rate
+    roundings = Resolution(0.0, np.array([0.0, off]), np.zeros(2), np.zeros(2))
+    motion = replace(rows(t, q, qd, 0 * q), resolution=roundings)
+    (found,) = of_tool(motion, beam, "quintic")
+    assert found.value == pytest.approx((0.5 + 0.99 * off) * rate**power, rel=1e-6)
+    assert found.certainty == "within rounding"
+    farther = replace(motion, q=q + np.array([0.0, 20 * off]))
+    assert [each.certainty for each in of_tool(farther, beam, "quintic")] == ["exceeded"]

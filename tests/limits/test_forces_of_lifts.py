@@ -10,7 +10,7 @@ import pytest
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.dynamics.effort_bound import EffortPeak
 from trajcli.findings import Finding
-from trajcli.kinematics.robot import Joint, LinkInertia, Robot, unlimited
+from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, unlimited
 from trajcli.limits.effort import FAMILY, MoveEfforts
 from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.tolerances import EFFORT_RELATIVE
@@ -104,6 +104,66 @@ def test_what_gravity_alone_exceeds_no_duration_helps(joint: int, side: float) -
     assert slower is not None
     assert slower.held_over() is None
     assert len(list(slower.over(robot))) == 1
+
+
+def rubbing(limit: float, down: float, up: float, side: float) -> MoveEfforts:
+    """Return what a lift with 15 N of friction needs that is braked for a second as it falls, and is slow behind it.
+
+    Accelerations are upwards; of gravity that points up all is mirrored. Forces are m (g + down) - 15 while it
+    goes down, and m (g + up) + 15 while it goes up again.
+    """
+    robot = lifts([WIDE, [-900.0, limit] if side > 0 else [-limit, 900.0]], side * G)
+    friction = Friction(coulomb=15.0)
+    robot = replace(robot, joints=(robot.joints[0], replace(robot.joints[1], friction=friction)))
+    curve = PiecewisePolynomial(np.array([0.0, 1.0, 2.0]), np.zeros((3, 2, 2)))
+    rows = curve.coefficients.copy()
+    rows[:, 0, 1] = [side * down / 2, -side * down, 0.0]
+    rows[:, 1, 1] = [side * up / 2, side * (2.0 - min(up, 0.0)), -side * down / 2]
+    curve = replace(curve, coefficients=rows)
+    states = (State(*(np.zeros(2) for _ in range(3))) for _ in range(2))
+    span = Span(1, "quintic", 0.0, 2.0, 2)
+    trajectory = Trajectory(curve, robot.joint_names, robot.joint_types, (span,), *states)
+    survey = FAMILY.survey(LimitedMove(trajectory, span, robot.limits, robot))
+    assert survey is not None
+    return survey
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_holds_it_over_is_where_gravity_with_friction_is_largest(side: float) -> None:
+    """It is most where the fall is braked, and would go away there; with friction gravity is too much on the way up."""
+    survey = rubbing(60.0, 12.0, 0.1, side)
+    peak = (survey.highest if side > 0 else survey.lowest)[1]
+    assert peak.time <= 1.0
+    assert peak.upper_bound == pytest.approx(MASS * (G + 12.0) - 15.0)
+    held = survey.held_over()
+    assert held is not None
+    assert (held[0], held[1]) == (1, side * 60.0)
+    assert held[2].static == pytest.approx(MASS * G + 15.0)
+    assert held[2].time >= 1.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_motion_that_a_stretch_brings_within_its_limit_is_not_held_over(side: float) -> None:
+    """Gravity with friction takes 64.05 N on the way up, where it slows down; 1.5 times as long all is within 60 N."""
+    limit = 60.0
+    down = 1.5**2 * (limit - MASS * G + 15.0) / MASS
+    up = 1.5**2 * (limit * (1 + 0.2 * EFFORT_RELATIVE) - MASS * G - 15.0) / MASS
+    survey = rubbing(limit, down, up, side)
+    (found,) = survey.over(lifts([WIDE, WIDE]))
+    assert found.factor == pytest.approx(1.5, rel=1e-5)
+    assert survey.held_over() is None
+
+
+def test_gravity_at_its_limit_does_not_exceed_it() -> None:
+    survey = FAMILY.survey(moved(lifts([WIDE, WIDE]), 1.0))
+    assert survey is not None
+    held = survey.survey.peak(1, 1, np.inf).static
+    assert held == pytest.approx(MASS * G)
+    at_it = FAMILY.survey(moved(lifts([WIDE, [-900.0, held]]), 1.0))
+    assert at_it is not None
+    (found,) = at_it.over(lifts([WIDE, WIDE]))
+    assert found.factor is None
+    assert at_it.held_over() is None
 
 
 def peaks(*highest: float) -> tuple[EffortPeak, ...]:

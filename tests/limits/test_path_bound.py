@@ -215,6 +215,39 @@ def test_what_has_no_bound_is_left_to_rows_and_said() -> None:
     assert longer.bounds == (None, None)
 
 
+class Unproven(PoseCurve):
+    """A path of which nothing is known about how it turns, or about where it goes."""
+
+    unknown = 1
+
+    def majorants(self, s: np.ndarray, rising: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        both = list(super().majorants(s, rising))
+        both[self.unknown] = np.full(rising.shape, np.inf)
+        return both[0], both[1]
+
+
+class UnprovenPosition(Unproven):
+    unknown = 0
+
+
+@pytest.mark.parametrize("orientation", ["all", "direction", "none"])
+def test_what_has_no_majorant_is_not_proven_whatever_the_other_has(orientation: str) -> None:
+    """The law goes past five tolerances between the nodes: what the joints alone leave there proves nothing."""
+    path = turning()
+    unproven = Unproven(path.position, path.orientation)
+    each = tool(standing(), law(5 * TOLERANCE), unproven, orientation)
+    free = orientation == "none"  # of which nothing need be known
+    assert most(each) == [pytest.approx(0.0, abs=1e-12), 0.0 if free else None]
+    assert ("angle from its orientation" in each.sampled) != free
+    assert "distance from the path" not in each.sampled
+    along = UnprovenPosition(line().position, line().orientation)
+    each = tool(standing(), law(5 * TOLERANCE), along, orientation)
+    assert each.bounds[0] is None
+    assert most(each)[1] == pytest.approx(0.0, abs=1e-12)
+    assert "distance from the path" in each.sampled
+    assert "angle from its orientation" not in each.sampled
+
+
 @pytest.mark.parametrize("orientation", ["all", "direction"])
 def test_what_hides_between_nodes_is_bounded_by_no_less_than_it_is(orientation: str) -> None:
     """A joint that turns steadily: of a matrix, and of an axis square to that joint, the ninth derivative is rate^9."""

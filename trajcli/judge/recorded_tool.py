@@ -15,6 +15,7 @@ from trajcli.judge.tool_path import RecordedPath
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.joint_turns import revolute
 from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import TOOL_KINDS, LimitKind
@@ -143,7 +144,7 @@ class ToolJudge:
     ) -> None:
         limit = float(getattr(robot.limits.tcp, kind.key))
         piece = self._piece_at(window, pieces, peak.time)
-        rounding = self._rounding(window, piece, kind.order or 1)
+        rounding = self._rounding(window, piece, kind)
         row = window.row_at(piece, peak.time - float(window.t[piece]))
         finding = replace(tool_excess(kind, peak.upper_bound, limit, peak.time), row=row, rounding=rounding)
         certain = peak.upper_bound - limit > rounding
@@ -171,9 +172,8 @@ class ToolJudge:
         lengths = window.lengths[pieces, None]
         if lengths.max() > DENSE or peak.upper_bound > _TWICE * limit:
             return False
-        slack = limit * (1 + _CLOSE) + self._rounding(
-            window, self._piece_at(window, pieces, peak.time), order
-        )
+        rounding = self._rounding(window, self._piece_at(window, pieces, peak.time), kind)
+        slack = limit * (1 + _CLOSE) + rounding
         rows = slice(pieces.start, pieces.stop + 1)
         states = tuple(None if values is None else values[rows] for values in window.states)
         q = np.asarray(states[0])
@@ -204,25 +204,33 @@ class ToolJudge:
         part = twist[:, 3:] if kind.dimension == "angle" else twist[:, :3]
         return int((np.linalg.norm(part, axis=1) > limit).sum())
 
-    def _rounding(self, window: Intervals, piece: int, order: int) -> float:
-        """Return by how much a derivative of the tool's motion may be off by the rounding of the rows."""
+    def _rounding(self, window: Intervals, piece: int, kind: LimitKind) -> float:
+        """Return by how much a derivative of the tool's motion may be off by the rounding of the rows.
+
+        What a slide moves by counts as a turn of the arm that moves its end as far; it turns nothing itself.
+        """
+        order, angular = kind.order or 1, kind.dimension == "angle"
         count = max(int(window.highest[piece]), 1)
         joints = np.arange(window.coefficients.shape[2])
         rows = window.piece_rows(np.full(joints.size, piece), joints, min(count, 3))
-        errors = [rows.error(k) for k in range(min(order, int(window.highest[piece])) + 1)]
-        arm = self._length
-        rates = [
-            np.abs(horner(derivative_coefficients(window.coefficients[:, piece], k), rows.length)).sum()
-            for k in range(order + 1)
+        turning = revolute(self._robot)
+        arm = 1.0 if angular else self._length
+        turns = np.where(turning, 1.0, 0.0 if angular else 1.0 / arm)
+        errors = [
+            float((turns * rows.error(k)).sum()) for k in range(min(order, int(window.highest[piece])) + 1)
         ]
-        total = arm * (errors[-1].sum() + errors[0].sum() * rates[order])
+        rates = [
+            float((turns * np.abs(horner(each, rows.length))).sum())
+            for each in (derivative_coefficients(window.coefficients[:, piece], k) for k in range(order + 1))
+        ]
+        total = arm * (errors[-1] + errors[0] * rates[order])
         if order == 2:
-            total += 2.0 * arm * rates[1] * (errors[1].sum() + errors[0].sum() * rates[1])
+            total += 2.0 * arm * rates[1] * (errors[1] + errors[0] * rates[1])
         if order == 3:
-            q, first, second = (error.sum() for error in errors[:3])
+            q, first, second = errors[:3]
             total += 3.0 * arm * (rates[1] * second + (rates[2] + rates[1] ** 2) * first)
             total += arm * q * rates[1] * (3.0 * rates[2] + rates[1] ** 2)
-        return float(total)
+        return total
 
     def _judge_singularity(self, window: Intervals, pieces: slice, robot: Robot, move: int) -> None:
         """Warn where the smallest singular value of the scaled Jacobian is a small part of the largest."""
