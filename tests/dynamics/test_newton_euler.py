@@ -132,6 +132,57 @@ def test_friction_by_the_sign_of_the_velocity():
     assert friction.tolist() == [[3.5, -2.5], [0.0, 2.125]]
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("rate", "rubs"), [(0.0, 0.0), (0.9e-12, 0.0), (1.1e-12, 1.0), (1e-9, 1.0), (1e-3, 1.0)]
+)
+def test_what_rounding_leaves_of_rest_has_no_friction(rate, rubs, side):
+    """A joint that is a little off its place at rest is not pushed by all of its friction."""
+    robot = planar_arm()
+    joints = tuple(replace(joint, friction=Friction(2.0, 0.0)) for joint in robot.joints)
+    friction = InverseDynamics(replace(robot, joints=joints)).friction([side * rate, 0.0])
+    assert friction.tolist() == [side * rubs * 2.0, 0.0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_along_a_path_efforts_are_linear_in_the_law(seed):
+    """With q(s(t)): M q' sdd + (M q'' + C q') sd^2 + g, each against its own column of inverse dynamics."""
+    rng = np.random.default_rng(seed)
+    dynamics = InverseDynamics(random_arm(rng, 5), payload=random_payload(rng))
+    q, first, second = rng.normal(size=(3, 7, 5))
+    a, b, held = dynamics.along_path(q, first, second)
+    close(held, gravity_effort(dynamics, q))
+    close(a, (mass_matrix(dynamics, q) @ first[..., None])[..., 0])
+    for sd, sdd in ((1.0, 0.0), (-1.0, 0.0), (3.0, -2.0)):
+        moving = dynamics.rigid_effort(q, first * sd, first * sdd + second * sd**2)
+        close(a * sdd + b * sd**2 + held, moving)
+
+
+def test_what_the_tool_weighs_is_carried_as_a_payload_is():
+    """Both at once weigh what both weigh."""
+    rng = np.random.default_rng(12)
+    robot, tool, load = random_arm(rng, 3), random_payload(rng), random_payload(rng)
+    q, qd, qdd = rng.normal(size=(3, 4, 3))
+    bare, with_tool, loaded, both = (
+        InverseDynamics(replace(robot, tool_load=one, payload=other)).effort(q, qd, qdd)
+        for one, other in ((None, None), (tool, None), (None, load), (tool, load))
+    )
+    close(with_tool, InverseDynamics(robot, payload=tool).effort(q, qd, qdd))
+    close(with_tool + loaded, both + bare)
+    assert np.abs(with_tool - bare).max() > 1.0
+
+
+def test_masses_are_symmetric_to_the_last_bit():
+    matrix = InverseDynamics(random_arm(np.random.default_rng(2), 6)).mass_matrix(np.linspace(-1, 2, 6))
+    assert (matrix == matrix.T).all()
+
+
+@pytest.mark.parametrize("gravity", [[0.0, np.nan, 0.0], [0.0, 0.0, -np.inf], [0.0, 0.0], 9.81])
+def test_gravity_that_is_no_vector_is_refused(gravity):
+    with pytest.raises(InputError, match="three finite numbers"):
+        InverseDynamics(planar_arm(), np.asarray(gravity))
+
+
 def test_hanging_base_turns_gravity_over():
     robot = planar_arm()
     upright = InverseDynamics(robot, np.array([1.0, 2.0, 3.0]))
