@@ -102,3 +102,52 @@ def test_fifty_rows_of_seven_joints_are_quick() -> None:
         trajcli.check(T, Q, robot="panda", qd=QD, qdd=QDD)
         spent.append(time.process_time() - start)
     assert min(spent) < 0.02
+
+
+@pytest.mark.parametrize("digits", [1, 8])
+def test_limits_are_those_of_the_call_whatever_numpy_prints_of_them(digits: int) -> None:
+    """What is kept of earlier calls is kept by every digit: notebooks print one or two."""
+    robot, fast = trajcli.load_robot("panda"), np.outer(0.3 * T, np.ones(7)) + Q[0]
+    wanted = [
+        (0.3 * (1 + 1e-8), "satisfied"),
+        (0.3 * (1 - 1e-8), "exceeded"),
+        (0.26, "exceeded"),
+        (0.34, "satisfied"),
+    ]
+    with np.printoptions(precision=digits, suppress=True):
+        for limit, verdict in wanted:
+            for velocity in (np.full(7, limit), dict(zip(robot.joint_names, np.full(7, limit), strict=True))):
+                assert trajcli.check(T, fast, robot=robot, limits={"velocity": velocity}).verdict == verdict
+
+
+@pytest.mark.parametrize("name", ["times", "q", "qd", "qdd"])
+@pytest.mark.parametrize("single", [True, False])
+def test_single_precision_explains_half_a_unit_of_its_last_place(name: str, *, single: bool) -> None:
+    """At 1 rad half a unit is 2^-24. Of times it explains none of the positions, and the other way round.
+
+    Of four arrays one is in single precision. A position is beyond its limit by half of that rounding, or by thrice.
+    """
+    at, rounding = 1.0, 2.0**-24
+    arrays = {
+        "times": np.arange(5.0),
+        "q": np.full((5, 1), at),
+        "qd": np.zeros((5, 1)),
+        "qdd": np.zeros((5, 1)),
+    }
+    if single:
+        arrays[name] = arrays[name].astype(np.float32)
+    for share in (0.5, 3.0):
+        found = trajcli.check(**arrays, limits={"position": [[-9.0, at - share * rounding]]})
+        explained = single and name != "times" and share < 1
+        assert found.verdict == ("within rounding" if explained else "exceeded"), share
+
+
+@pytest.mark.parametrize("single", [True, False])
+def test_times_of_single_precision_explain_velocities_between_them(*, single: bool) -> None:
+    """A joint at 1 rad/s, its rows at no period, 64 s from the start of the clock; stamps are rounded to 2^-18 s."""
+    meant = 64.0 + np.cumsum(np.random.default_rng(3).uniform(0.005, 0.02, 40))
+    rounded = meant.astype(np.float32)
+    found = trajcli.check(
+        rounded if single else rounded.astype(np.float64), meant[:, None], limits={"velocity": 1.0}
+    )
+    assert found.verdict == ("within rounding" if single else "exceeded")

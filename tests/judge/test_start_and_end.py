@@ -104,6 +104,28 @@ def test_a_joint_with_rough_numbers_hides_no_other_one(name: str, row: int) -> N
     assert (found.joint, found.severity, found.certainty) == ("j3", "error", "exceeded")
 
 
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize(("row", "kind"), [(0, "start"), (-1, "end")])
+def test_joints_that_are_where_they_shall_be_hide_no_rough_one(row: int, kind: str, joint: int) -> None:
+    """One joint is beyond its tolerance by half of its rounding, which is larger than what the others have left."""
+    off = np.where(np.arange(3) == joint, 1e-1, 1e-6)
+    (found,) = states_of(moved(motion(off), "q", row, joint, 5e-2))
+    assert (found.kind, found.joint, found.certainty) == (kind, f"j{joint + 1}", "within rounding")
+
+
+@pytest.mark.parametrize(("order", "name"), [(1, "velocity"), (2, "acceleration")])
+def test_each_rate_has_the_rounding_of_its_own_columns(order: int, name: str) -> None:
+    """Velocities of two decimals and accelerations of four, or the other way round, both off by 1e-3."""
+    rows = replace(motion(), qdd=np.zeros((4, 3)))
+    for column in ("qd", "qdd"):
+        rows = moved(rows, column, -1, 1, 1e-3)
+    rough, fine = np.full(3, 5e-3), np.full(3, 5e-5)
+    given = (fine, rough) if order == 1 else (rough, fine)
+    (found,) = states_of(replace(rows, resolution=Resolution(0.0, OFF, *given)))
+    assert (found.kind, found.joint, found.quantity, found.severity) == ("end", "j2", name, "error")
+    assert found.rounding == pytest.approx(5e-5 + 1e-6, rel=1e-6)
+
+
 @pytest.mark.parametrize("blocks", [1, 2, 3, 10])
 @pytest.mark.parametrize(
     ("stamps", "wrong"),
@@ -120,6 +142,56 @@ def test_stamps_are_later_than_all_before_them(stamps, wrong, blocks) -> None:
     assert sum(each.count for each in found) == len(wrong)
     assert {each.row for each in found} <= set(wrong)
     assert all((each.severity, each.certainty) == ("error", "exceeded") for each in found)
+
+
+@pytest.mark.parametrize("stamp", [-1.0, 2.99, 2.98, np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("row", [300, 301, 599])
+def test_stamps_are_later_than_those_of_the_block_before(row: int, stamp: float) -> None:
+    """Rows 10 ms apart come 300 at a time: stamps of the first of a block, of the second and of the last are wrong."""
+    t = 0.01 * np.arange(600)
+    t[row] = stamp
+    off = np.zeros(3)
+    rows = RecordedMotion(
+        t,
+        np.tile(START, (600, 1)),
+        None,
+        None,
+        None,
+        None,
+        None,
+        None,
+        Resolution(0.0, off, off, off),
+        "rows",
+    )
+    (found,) = [each for each in judged(rows, end=False, blocks=300).findings if each.rule == "time"]
+    assert (found.row, found.count, found.severity, found.certainty) == (row + 1, 1, "error", "exceeded")
+
+
+@pytest.mark.parametrize("name", ["q", "qd"])
+@pytest.mark.parametrize("row", [0, -1])
+def test_rounding_by_a_share_of_each_number_explains_what_it_may(row: int, name: str) -> None:
+    """Of numbers of single precision 2^-24 of 0.5 explains a position, and of 20 a velocity."""
+    relative, joint = 2.0**-24, 1
+    states = [State(each, np.full(3, 20.0), np.zeros(3)) for each in (START, END)]
+    given = replace(motion(np.zeros(3)), qd=np.full((4, 3), 20.0))
+    single = replace(given, resolution=replace(given.resolution, relative=relative))
+    required = Requirements(
+        bare_robot(unlimited(3)),
+        start=states[0],
+        start_tolerance=TOLERANCE,
+        end=states[1],
+        interpolate="linear",
+    )
+    size = 20.0 if name == "qd" else abs((START, END)[row][joint]) + TOLERANCE[joint]
+    line = 1e-6 if name == "qd" else TOLERANCE[joint]
+    for share in (0.5, 1.5):
+        by = np.sign(getattr(given, name)[row, joint]) * (line + share * relative * size)
+        for rows, explained in ((single, share < 1), (given, False)):
+            blocks = [moved(rows, name, row, joint, by)]
+            findings = judge_motion(blocks.copy, required).findings
+            found = [each.certainty for each in findings if each.rule == "state"]
+            silent = explained and name == "qd"
+            assert found == ([] if silent else ["within rounding" if explained else "exceeded"])
 
 
 @pytest.mark.parametrize("wanted", [0.0, -2.0, np.nan])
@@ -145,6 +217,19 @@ def test_the_last_row_has_the_acceleration_of_the_end(joint: int, over: float, w
         )
         assert each.value - each.limit == pytest.approx(over, rel=1e-6)
         assert "an acceleration of" in each.message
+
+
+@pytest.mark.parametrize("joint", range(3))
+def test_a_joint_that_steps_in_the_end_hides_no_other_one(joint: int) -> None:
+    """What nobody says of one joint is said of the two others, the second of which is off."""
+    stepping, other = np.arange(3) == joint, (joint + 1) % 3
+    state = State(END, np.zeros(3), np.where(stepping, np.nan, 0.0))
+    qdd = np.zeros((4, 3))
+    qdd[-1, joint], qdd[-1, other] = 7.0, -0.5
+    required = Requirements(bare_robot(unlimited(3)), end=state, start_tolerance=TOLERANCE)
+    findings = judge_motion(lambda: [replace(motion(), qdd=qdd)], required).findings
+    (found,) = [each for each in findings if each.rule == "state"]
+    assert (found.joint, found.value, found.limit, found.count) == (f"j{other + 1}", -0.5, 0.0, 1)
 
 
 @pytest.mark.parametrize(("planner", "judged"), [("quintic", True), ("cubic", False)])

@@ -32,10 +32,12 @@ def opened(path):
 
 def test_decimals_of_json_are_those_of_its_shortest_numbers(tmp_path):
     path = tmp_path / "a.jsonl"
-    path.write_text("".join(json.dumps({"time": k / 8, "pos": [k * 0.25, 1.5]}) + "\n" for k in range(4)))
-    resolution = open_motion(path, units="rad").resolution
-    assert resolution.time == 0.0005
-    assert resolution.q.tolist() == [0.005, 0.05]
+    for second, half in ((0.5, 0.05), (0.0, 0.005)):  # a joint that stands has the decimals of the other one
+        rows = ({"time": k / 8, "pos": [k * 0.25, 1.5 + k * second]} for k in range(4))
+        path.write_text("".join(json.dumps(row) + "\n" for row in rows))
+        resolution = open_motion(path, units="rad").resolution
+        assert resolution.time == 0.0005
+        assert resolution.q.tolist() == [0.005, half]
     path.write_text(json.dumps({"t": 0.5, "q": [1 / 3, 1.5]}) + "\n")
     resolution = open_motion(path).resolution
     assert (resolution.time, resolution.q.tolist()) == (0.0, [0.0, 0.0])

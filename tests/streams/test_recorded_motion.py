@@ -481,3 +481,27 @@ def test_any_bytes_are_a_motion_or_an_error(tmp_path_factory, content, magic):
     path = tmp_path_factory.mktemp("fuzz") / "in"
     path.write_bytes(magic.encode("latin-1") + content)
     opened(path)
+
+
+@pytest.mark.parametrize("name", ["in.csv", "in.jsonl"])
+def test_a_joint_that_stands_says_nothing_of_its_decimals(tmp_path: Path, name: str) -> None:
+    """Six decimals, written without the zeros in the end; the third joint moves in whole tenths, by its own digits."""
+    rows = [
+        [round(0.1 * k, 1), round(0.1234567 * k, 6), 0.3, round(0.1 * k, 1), 0.5, 0.0, 1.25] for k in range(9)
+    ]
+    text = table("t,q1,q2,q3,qd1,qd2,qd3", rows)
+    if name == "in.jsonl":
+        text = "".join(json.dumps({"t": row[0], "q": row[1:4], "qd": row[4:]}) + "\n" for row in rows)
+    resolution = open_motion(written(tmp_path, text, name)).resolution
+    assert resolution.q.tolist() == pytest.approx([5e-7, 5e-7, 0.05])
+    assert resolution.qd.tolist() == pytest.approx([0.005] * 3)
+
+
+def test_a_joint_in_another_unit_has_decimals_of_its_own(tmp_path: Path) -> None:
+    """Whole degrees of a joint that stands are those of the other joint in degrees; no decimals of millimetres."""
+    rows = [[0.1 * k, round(1.234 * k, 3), 90, 0.5, round(0.12345 * k, 5)] for k in range(5)]
+    resolution = open_motion(
+        written(tmp_path, table("t,q1_deg,q2_deg,q3_mm,q4_mm", rows)),
+        joint_types=("revolute", "revolute", "prismatic", "prismatic"),
+    ).resolution
+    assert resolution.q.tolist() == pytest.approx([5e-4 * pi / 180] * 2 + [5e-9] * 2)

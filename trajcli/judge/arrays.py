@@ -118,8 +118,17 @@ def requirements_of(
 
         bare = replace(bare, limits=limits)
     elif limits is not None:
-        bare = _limited(_Held(bare), _Held(limits, repr(limits)))
+        bare = _limited(_Held(bare), _Held(limits, repr(_plain(limits))))
     return Requirements(bare, interpolate=interpolate, tool=_tool_of(_Held(bare)))
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """Return the same with lists for arrays: numpy prints as many digits of these as a user wants to see."""
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 class _Held:

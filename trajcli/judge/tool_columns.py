@@ -31,7 +31,7 @@ from trajcli.kinematics.inverse.target import residuals
 from trajcli.kinematics.jacobian import jacobian_dot_qd, tcp_twist
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution, blocks_of_size
-from trajcli.streams.row_sources import RowSource
+from trajcli.streams.row_sources import ColumnExtents, RowSource
 
 _EXACT = 1e-9  # m or rad, and of their derivatives: what FK of another processor leaves
 _REACH = 2.0  # times the arm: how far a joint may be from the tool
@@ -85,9 +85,10 @@ def open_tool_table(rows: RowSource, size: int) -> ToolTable | None:
         return None
     columns = tuple(every[k] for k in taken)
     factors = np.array([column.factor for column in columns])
-    for _ in rows.blocks(range(len(every)), ()):
-        pass  # only all rows say the decimals
-    halves = halves_of(rows, every)[taken] * factors
+    extents = ColumnExtents(len(every))
+    for block in rows.blocks(range(len(every)), ()):  # only all rows say the decimals
+        extents.add(block)
+    halves = halves_of(rows, every, extents.still)[taken] * factors
 
     def blocks() -> Iterator[Array]:
         return (block * factors for block in blocks_of_size(rows.blocks(taken, ()), size))

@@ -24,7 +24,7 @@ from trajcli.streams.recorded.column_units import (
     scales_of,
 )
 from trajcli.streams.recorded.stamp_period import PeriodFit
-from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, RowSource
+from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, ColumnExtents, RowSource, decimals_of_still
 from trajcli.units import Units
 
 Names = tuple[str, ...] | None
@@ -159,7 +159,7 @@ class MotionFile:
     def _read_all(self, scales: ColumnScales) -> None:
         """Read all rows once, and keep them where they are few."""
         fit, self.rows, kept = PeriodFit(), 0, 0
-        everywhere = _Magnitudes(len(self._taken))
+        everywhere = ColumnExtents(len(self._taken))
         for block in self._rows.blocks(self._taken, self._fixed):
             if scales.open:
                 self._refuse_open(scales.open, block)
@@ -241,9 +241,13 @@ class MotionFile:
             first,
         )
 
-    def _resolution(self, everywhere: _Magnitudes) -> Resolution:
+    def _resolution(self, everywhere: ColumnExtents) -> Resolution:
         """Return the rounding of the numbers, from their decimals."""
         decimals = self._rows.decimals(self._taken)
+        quantities = {at: name for name, found in self._joints.items() for at in found}
+        alike = [(quantities.get(at, at), factor) for at, factor in enumerate(self._factors.tolist())]
+        written = decimals_of_still(decimals, everywhere.still, alike)
+        decimals = np.where((decimals > 0) | (self._factors != 1.0), written, decimals)
         half = np.where(decimals == EXACT, 0.0, 0.5 * 10.0 ** -np.maximum(decimals, 0).astype(np.float64))
         # nobody rounds to whole radians, metres or seconds
         half[(decimals <= 0) & (self._factors == 1.0)] = 0.0
@@ -256,7 +260,7 @@ class MotionFile:
         return Resolution(time, q, qd, qdd, share, float(relative[self._time]))
 
     def _halves(
-        self, half: Array, decimals: NDArray[np.int64], everywhere: _Magnitudes, quantity: str
+        self, half: Array, decimals: NDArray[np.int64], everywhere: ColumnExtents, quantity: str
     ) -> Array:
         """Return the rounding of a quantity by joint, (n,); zeros where there is none."""
         found = self._joints.get(quantity)
@@ -268,16 +272,6 @@ class MotionFile:
         bare = ~written & (everywhere.largest[found] == 0.0)  # zeros without a point: as the others
         values[bare] = values[written].max(initial=0.0)
         return np.asarray(values)
-
-
-class _Magnitudes:
-    """The largest magnitudes of some columns, (m,)."""
-
-    def __init__(self, width: int) -> None:
-        self.largest = np.zeros(width)
-
-    def add(self, block: Array) -> None:
-        np.maximum(self.largest, np.maximum(block.max(axis=0), -block.min(axis=0)), out=self.largest)
 
 
 def blocks_of_size(blocks: Iterable[Array], rows: int) -> Iterator[Array]:

@@ -27,7 +27,7 @@ from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.stamp_period import simplest_between
 from trajcli.streams.recorded_motion import blocks_of_size
-from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, RowSource
+from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, ColumnExtents, RowSource, decimals_of_still
 from trajcli.units import Units
 
 _ROWS = 4096  # compared at a time
@@ -175,10 +175,11 @@ def _read(rows: RowSource, columns: Sequence[Column]) -> tuple[Array | None, _St
     time = next(k for k, column in enumerate(columns) if column.kind == "t")
     kept: list[Array] | None = []
     count, numbers, ends, rising = 0, 0, np.empty(0), True
-    first = 0.0
+    first, extents = 0.0, ColumnExtents(len(columns))
     for block in rows.blocks(every, ()):
         if not len(block):
             continue
+        extents.add(block)
         t = block[:, time]
         first = first if count else float(t[0])
         rising &= bool((np.diff(np.append(ends[-1:], t)) > 0).all())
@@ -187,7 +188,7 @@ def _read(rows: RowSource, columns: Sequence[Column]) -> tuple[Array | None, _St
         if kept is not None:
             kept.append(block)
             kept = kept if numbers <= _KEPT else None
-    halves = halves_of(rows, columns)
+    halves = halves_of(rows, columns, extents.still)
     if not rising or count < 1:
         return None, None, halves
     rounding = halves[time] if halves[time] else (_NANOSECOND if rows.format in ("mcap", "ros") else 0.0)
@@ -195,9 +196,16 @@ def _read(rows: RowSource, columns: Sequence[Column]) -> tuple[Array | None, _St
     return (None if kept is None else np.concatenate(kept)), stamps, halves
 
 
-def halves_of(rows: RowSource, columns: Sequence[Column]) -> Array:
-    """Return half a unit of the last decimal of each column, once all rows were taken, in its units, (m,)."""
-    decimals = rows.decimals(range(len(columns)))
+def halves_of(rows: RowSource, columns: Sequence[Column], still: NDArray[np.bool_]) -> Array:
+    """Return half a unit of the last decimal of each column, once all rows were taken, in its units, (m,).
+
+    Args:
+        rows: The file.
+        columns: What each of its columns is.
+        still: Which of them show one number alone, shape (m,).
+    """
+    alike = [(group_of(column), column.unit) for column in columns]
+    decimals = decimals_of_still(rows.decimals(range(len(columns))), still, alike)
     exact = (decimals == EXACT) | (decimals.max() >= FULL_DECIMALS)
     halves = np.where(exact, 0.0, _HALF * 10.0 ** -np.maximum(decimals, 0).astype(np.float64))
     halves[[column.whole_numbers for column in columns]] = 0.0

@@ -1,0 +1,207 @@
+"""Rows that a formula makes of the law of a move: known as those of the plan, and refused beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import random_jobs
+from numpy.typing import NDArray
+
+from trajcli.judge.file import CheckOptions, check_file
+from trajcli.judge.rows.planned_rows import RowComparison, compare_with_plan
+from trajcli.planning.plan import Plan, plan_job
+from trajcli.streams.byte_source import ByteSource
+
+START, END = np.array([0.1, 0.25, -0.4]), np.array([1.3, 0.25, 0.9])
+DURATION = 1.25
+NAMES = ["t", *(f"{kind}{joint}" for kind in ("q", "qd", "qdd") for joint in (1, 2, 3))]
+Rows = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    """Return the plan of one quintic, of which the second joint stands."""
+    fields = {"version": 1, "robot": {"joints": 3}, "start": {"joints": START.tolist()}}
+    fields |= {"limits": {"velocity": 9, "acceleration": 90, "jerk": None}, "output": {"rate": 10}}
+    move = {"planner": "quintic", "to": {"joints": END.tolist()}, "duration": DURATION}
+    return plan_job(random_jobs.loaded(fields | {"moves": [move]}))
+
+
+def states(t: Rows) -> Rows:
+    """Return positions, velocities and accelerations (N, 9) of the minimum-jerk law at some times."""
+    u = np.clip(t / DURATION, 0.0, 1.0)[:, None]
+    laws = (
+        10 * u**3 - 15 * u**4 + 6 * u**5,
+        (30 * u**2 - 60 * u**3 + 30 * u**4) / DURATION,
+        (60 * u - 180 * u**2 + 120 * u**3) / DURATION**2,
+    )
+    moved = [law * (END - START) for law in laws]
+    return np.hstack([START + moved[0], *moved[1:]])
+
+
+def rows_at(rate: float = 10.0, late: float = 0.0) -> Rows:
+    """Return all rows of a rate, and one at the end, of times that are late by some seconds."""
+    t = np.append(np.arange(int(DURATION * rate * (1 + 1e-12)) + 1) / rate, DURATION)
+    t = t[:-1] if t[-2] >= DURATION - 1e-9 else t
+    return np.hstack([t[:, None], states(t + late)])
+
+
+def compared(
+    folder: Path, plan: Plan, rows: Rows, digits: str = ".9f", names: list[str] = NAMES
+) -> RowComparison:
+    """Return what a comparison says of rows as CSV, values by a format, stamps to the nanosecond."""
+    lines = (
+        ",".join(
+            [
+                format(row[0], ".17g" if digits == ".17g" else ".9f"),
+                *(format(value, digits) for value in row[1:]),
+            ]
+        )
+        for row in rows.tolist()
+    )
+    file = folder / "rows.csv"
+    file.write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")
+    return compare_with_plan(ByteSource(str(file)), plan)
+
+
+@pytest.mark.parametrize("digits", [".3f", ".6f", ".9f", ".17g"])
+@pytest.mark.parametrize("rate", [10.0, 16.0, 1 / 0.15, 0.5])
+def test_rows_of_the_law_are_known(rate: float, digits: str, plan: Plan, tmp_path: Path) -> None:
+    assert compared(tmp_path, plan, rows_at(rate), digits).planned
+    shifted = rows_at(rate)
+    shifted[:, 0] += 7.5
+    assert compared(tmp_path, plan, shifted, digits).planned
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("column", range(1, 10))
+def test_one_number_of_one_row_is_off_by_a_unit_of_its_last_decimal(column, sign, plan, tmp_path) -> None:
+    """Any row, the first and the last among them: the number is then more than half a unit beside the law."""
+    for row in {0, 1 + column, -1}:
+        rows = np.round(rows_at(), 6)
+        rows[row, column] += sign * 1e-6
+        found = compared(tmp_path, plan, rows, ".6f")
+        assert not found.planned
+        assert f"row {row % len(rows) + 1} has {NAMES[column]}" in found.difference
+
+
+@pytest.mark.parametrize("column", range(1, 10))
+def test_full_digits_are_off_by_what_no_processor_makes(column: int, plan: Plan, tmp_path: Path) -> None:
+    """A few units in the last place are left to other processors, a billionth is not."""
+    rows = rows_at()
+    rows[3, column] += 1e-9
+    assert not compared(tmp_path, plan, rows, ".17g").planned
+    rows[3, column] += 1e-13 - 1e-9
+    assert compared(tmp_path, plan, rows, ".17g").planned
+
+
+@pytest.mark.parametrize("late", [0.4e-3, -0.4e-3, 2e-3, -2e-3])
+def test_stamps_of_three_decimals_stand_for_half_a_millisecond(
+    late: float, plan: Plan, tmp_path: Path
+) -> None:
+    """Rows at the rate 1/0.15 Hz: values of nine decimals from beside their stamps, which show three."""
+    rows, file = rows_at(1 / 0.15, late), tmp_path / "rows.csv"
+    rows[0], rows[-1] = rows_at(1 / 0.15)[[0, -1]]
+    lines = (",".join([f"{row[0]:.3f}", *(f"{value:.9f}" for value in row[1:])]) for row in rows.tolist())
+    file.write_text("\n".join([",".join(NAMES), *lines]) + "\n", encoding="utf-8")
+    found = compare_with_plan(ByteSource(str(file)), plan)
+    assert found.planned is (abs(late) < 0.5e-3)
+
+
+def test_columns_may_stand_in_any_order_but_not_for_each_other(plan: Plan, tmp_path: Path) -> None:
+    rows, order = rows_at(), [0, 9, 2, 1, 3, 7, 4, 6, 5, 8]
+    assert compared(tmp_path, plan, rows[:, order], names=[NAMES[k] for k in order]).planned
+    for a, b in ((1, 3), (4, 6), (7, 9), (4, 7), (1, 2)):
+        swapped = list(NAMES)
+        swapped[a], swapped[b] = swapped[b], swapped[a]
+        assert not compared(tmp_path, plan, rows, names=swapped).planned
+
+
+def test_joints_of_a_message_have_the_names_of_the_job(plan: Plan, tmp_path: Path) -> None:
+    names = list(plan.loaded.robot.joint_names)
+    for order in ([0, 1, 2], [2, 1, 0], [0, 2, 1]):
+        points = [
+            {
+                "positions": row[1:4],
+                "velocities": row[4:7],
+                "accelerations": row[7:],
+                "time_from_start": dict(
+                    zip(("sec", "nanosec"), divmod(round(row[0] * 1e9), 10**9), strict=True)
+                ),
+            }
+            for row in rows_at().tolist()
+        ]
+        file = tmp_path / "rows.yaml"
+        file.write_text(json.dumps({"joint_names": [names[k] for k in order], "points": points}))
+        assert compare_with_plan(ByteSource(str(file)), plan).planned is (order == [0, 1, 2])
+
+
+def _gone(rows: Rows) -> Rows:
+    return np.delete(rows, 4, axis=0)
+
+
+def _late(rows: Rows) -> Rows:
+    rows[5, 0] += 2e-9
+    return rows
+
+
+def _early(rows: Rows) -> Rows:
+    rows[5, 0] -= 2e-9
+    return rows
+
+
+def _doubled(rows: Rows) -> Rows:
+    return np.insert(rows, 3, rows[3], axis=0)
+
+
+@pytest.mark.parametrize(
+    "fault", [_gone, _late, _early, _doubled, lambda rows: rows[:-1], lambda rows: rows[1:]]
+)
+def test_stamps_that_are_not_all_times_of_the_rate(
+    fault: Callable[[Rows], Rows], plan: Plan, tmp_path: Path
+) -> None:
+    assert not compared(tmp_path, plan, fault(rows_at())).planned
+
+
+@pytest.mark.parametrize("row", [3, 4095, 4096, 5000, 8191, 8192, -1])
+def test_a_row_of_any_block_is_looked_at_and_named(row: int, plan: Plan, tmp_path: Path) -> None:
+    rows = rows_at(8000.0)[:, [0, 3]]
+    rows[row, 1] += 2e-6
+    found = compared(tmp_path, plan, rows, ".6f", ["t", "q3"])
+    assert found.difference is not None
+    assert f"row {row % len(rows) + 1} has q3" in found.difference
+
+
+@pytest.mark.parametrize("ending", ["csv", "jsonl"])
+@pytest.mark.parametrize(("stands", "planned"), [(0.25, True), (0.3, False), (0.2, False), (0.252, False)])
+def test_a_joint_stands_where_it_shall_though_few_digits_are_shown(
+    stands: float, ending: str, *, planned: bool, plan: Plan, tmp_path: Path
+) -> None:
+    """Six decimals in the shortest spelling: 0.3 is no 0.25 that was rounded to one decimal."""
+    rows, file = np.round(rows_at(), 6), tmp_path / f"rows.{ending}"
+    rows[:, 2] = stands
+    lines = [",".join(NAMES), *(",".join(map(repr, row)) for row in rows.tolist())]
+    if ending == "jsonl":
+        parts = ({"t": r[0], "q": r[1:4], "qd": r[4:7], "qdd": r[7:]} for r in rows.tolist())
+        lines = [json.dumps(part) for part in parts]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert compare_with_plan(ByteSource(str(file)), plan).planned is planned
+    judgement = check_file(str(file), CheckOptions(), plan).judgement
+    assert judgement.verdict == ("exceeded" if abs(stands - 0.25) > 1e-3 else "satisfied")
+
+
+@pytest.mark.parametrize(("limit", "verdict"), [(0.27, "exceeded"), (0.31, "satisfied")])
+def test_a_joint_that_stands_beyond_its_range_is_beyond_it(
+    limit: float, verdict: str, tmp_path: Path
+) -> None:
+    robot, limits, file = tmp_path / "robot.yaml", tmp_path / "limits.yaml", tmp_path / "rows.csv"
+    robot.write_text("{joints: 2}")
+    limits.write_text(f"{{position: [[-9, 9], [-9, {limit}]]}}")
+    rows = (f"{0.1 * k:.1f},{0.012345 * k:.6f},0.3" for k in range(9))
+    file.write_text("t,q1,q2\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    options = CheckOptions(robot=str(robot), limits=str(limits))
+    assert check_file(str(file), options).judgement.verdict == verdict

@@ -1,0 +1,150 @@
+"""What a job says of a file beside it: limits of each move, start, end, and whether its rows are proven already."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from trajcli.errors import InputError
+from trajcli.judge.file import CheckOptions, check_file
+from trajcli.judge.judgement import Judgement
+
+TWO_MOVES = """\
+version: 1
+robot: {joints: 2}
+limits: {velocity: 9, acceleration: 90, jerk: null}
+start: {joints: [0, 0]}
+moves:
+  - {planner: quintic, to: {joints: [1, 0]}, duration: 1}
+  - {planner: quintic, to: {joints: [1, 1]}, duration: 1, limits: {velocity: 2}}
+output: {rate: 100}
+"""
+"""Minimum-jerk laws reach 15/8 of their distance in a second."""
+ONE_MOVE = """\
+version: 1
+robot: {joints: 2}
+limits: {velocity: 9, acceleration: ACCELERATION, jerk: null}
+start: {joints: [0, 0.5]}
+moves: [{planner: PLANNER, to: {joints: [1, END]}, duration: 1}]
+output: {rate: 100}
+"""
+
+
+def quintic(u: np.ndarray) -> list[np.ndarray]:
+    """Return the minimum-jerk law from 0 to 1 and two derivatives."""
+    u = np.clip(u, 0.0, 1.0)
+    return [10 * u**3 - 15 * u**4 + 6 * u**5, 30 * u**2 * (1 - u) ** 2, 60 * u * (1 - u) * (1 - 2 * u)]
+
+
+def cubic(u: np.ndarray) -> list[np.ndarray]:
+    return [u**2 * (3 - 2 * u), 6 * u * (1 - u), 6 - 12 * u]
+
+
+def judged(folder: Path, job: str, rows: np.ndarray, names: str, **asked: str) -> Judgement:
+    (folder / "job.yaml").write_text(job)
+    lines = (",".join(f"{value:.9f}" for value in row) for row in rows.tolist())
+    (folder / "rows.csv").write_text("\n".join([names, *lines]) + "\n")
+    options = CheckOptions(job=str(folder / "job.yaml"), **asked)
+    return check_file(str(folder / "rows.csv"), options).judgement
+
+
+def two_moves(first: float, second: float, stretch: float = 1.0) -> np.ndarray:
+    """Return rows of both moves with distances of their own."""
+    t = 0.01 * np.arange(201)
+    states = [
+        np.stack([first * one, second * other], axis=1) / stretch**order
+        for order, (one, other) in enumerate(zip(quintic(t), quintic(t - 1), strict=True))
+    ]
+    return np.hstack([t[:, None] * stretch, *states])
+
+
+NAMES = "t,q1,q2,qd1,qd2,qdd1,qdd2"
+
+
+@pytest.mark.parametrize("begins", [0.0, 5.0, -0.75])
+@pytest.mark.parametrize(("second", "over"), [(1.06, False), (1.08, True), (-1.08, True)])
+def test_rows_have_the_limits_of_the_moves_at_their_times(second, over, begins, tmp_path) -> None:
+    """The second move has 2 rad/s, which 1.08 rad exceed; the first one goes at 2.25 rad/s, and may."""
+    rows = two_moves(1.2, second)
+    rows[:, 0] += begins
+    judgement = judged(tmp_path, TWO_MOVES, rows, NAMES)
+    found = [
+        (each.joint, each.move, abs(each.limit)) for each in judgement.findings if each.kind == "velocity"
+    ]
+    assert found == ([("j2", 1, 2.0)] if over else [])
+    assert not any("no column `move`" in note for note in judgement.notes)
+    assert judgement.planned_rows is False
+
+
+@pytest.mark.parametrize("stretch", [1.001, 0.999])
+def test_rows_that_last_longer_or_shorter_are_of_no_move(stretch: float, tmp_path: Path) -> None:
+    judgement = judged(tmp_path, TWO_MOVES, two_moves(1.2, 1.08, stretch), NAMES)
+    assert not [each for each in judgement.findings if each.kind == "velocity"]
+    assert any("no column `move`" in note for note in judgement.notes)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "allowed"), [(None, 1e-3), ("0.02", 0.02), ("1 deg", np.pi / 180), ("0", 0.0)]
+)
+def test_the_first_row_is_where_the_job_starts(tolerance: str | None, allowed: float, tmp_path: Path) -> None:
+    asked = {} if tolerance is None else {"start_tolerance": tolerance}
+    for by in (allowed + 1e-5, allowed - 1e-5, -allowed - 1e-5):
+        rows = two_moves(1.0, 1.0)
+        rows[:, 2] += by
+        findings = judged(tmp_path, TWO_MOVES, rows, NAMES, **asked).findings
+        found = [each.joint for each in findings if (each.rule, each.kind) == ("state", "start")]
+        assert found == (["j2"] if abs(by) > allowed else [])
+
+
+def test_a_start_tolerance_below_zero_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="at least 0"):
+        judged(tmp_path, TWO_MOVES, two_moves(1, 1), NAMES, start_tolerance="-0.1")
+
+
+def rows_of(law, end: float, period: float = 0.01) -> np.ndarray:
+    u = np.arange(round(1 / period) + 1) * period
+    start, change = np.array([0.0, 0.5]), np.array([1.0, end - 0.5])
+    states = [values[:, None] * change for values in law(u)]
+    return np.hstack([u[:, None], start + states[0], *states[1:]])
+
+
+@pytest.mark.parametrize("limit", [5.7, 5.8])
+def test_rows_of_a_plan_that_fails_are_judged_like_any_others(limit: float, tmp_path: Path) -> None:
+    """The law reaches 10/sqrt(3) = 5.77 rad/s^2: nothing is proven of a plan that exceeds its limits."""
+    job = ONE_MOVE.replace("PLANNER", "quintic").replace("END", "0.5").replace("ACCELERATION", str(limit))
+    judgement = judged(tmp_path, job, rows_of(quintic, 0.5), NAMES)
+    passes = limit > 10 / 3**0.5
+    assert judgement.verdict == ("satisfied" if passes else "exceeded")
+    assert (judgement.planned_rows is True) is passes
+
+
+@pytest.mark.parametrize(("asked", "verdict"), [({}, "satisfied"), ({"interpolate": "cubic"}, "exceeded")])
+def test_rows_of_a_plan_are_proven_unless_somebody_says_how_they_are_joined(asked, verdict, tmp_path) -> None:
+    """Every quarter of a second: cubics between these reach more than the law, and more than the limit."""
+    rows, limit = rows_of(quintic, 0.5, 0.25)[:, :5], 5.8
+    curve = CubicHermiteSpline(rows[:, 0], rows[:, 1], rows[:, 3])
+    assert np.abs(curve(np.linspace(0, 1, 1001), 2)).max() > 1.05 * limit
+    job = ONE_MOVE.replace("PLANNER", "quintic").replace("END", "0.5").replace("ACCELERATION", str(limit))
+    judgement = judged(tmp_path, job, rows, "t,q1,q2,qd1,qd2", **asked)
+    assert (judgement.planned_rows, judgement.verdict) == (True, verdict)
+    severities = {each.severity for each in judgement.findings if each.kind == "acceleration"}
+    assert severities == {"error" if asked else "warning"}
+
+
+@pytest.mark.parametrize("end", [0.5, 1.5, -0.5])
+@pytest.mark.parametrize("wrong", [None, 0, 1])
+def test_an_acceleration_that_steps_in_the_end_is_promised_by_no_joint_but_those_that_stand(
+    wrong: int | None, end: float, tmp_path: Path
+) -> None:
+    """Cubics end with an acceleration of six times their distance, down or up; a joint that stands ends with none."""
+    job = ONE_MOVE.replace("PLANNER", "cubic").replace("END", str(end)).replace("ACCELERATION", "90")
+    rows = rows_of(cubic, end)
+    rows[50, 1] += 1e-5  # no rows of the plan
+    if wrong is not None:
+        rows[-1, 5 + wrong] += 0.5
+    findings = judged(tmp_path, job, rows, NAMES).findings
+    found = [each.joint for each in findings if (each.kind, each.quantity) == ("end", "acceleration")]
+    assert found == (["j2"] if wrong == 1 and end == 0.5 else [])
