@@ -209,3 +209,25 @@ def test_a_component_is_at_its_limit_where_it_goes_at_that_speed(sign: float) ->
     np.testing.assert_allclose(found, [1.5 - (0.8 - nearest) / 0.5], rtol=1e-6)
     away = durations_at_limit(-line, np.array([0.1]), limits, 1e-9)
     assert away == [0.0]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("turns", [True, False])
+def test_who_is_too_near_to_a_bound_may_only_leave_it(turns: bool, side: float) -> None:
+    """Half a metre before a bound that may be approached with none but 0 from a metre on: it comes 0.1 nearer.
+
+    It begins there, so that it passes no distance from which on it is too near.
+    """
+    limits = ApproachLimits(np.array([[-2.0, 2.0]]), np.array([0.5]), np.array([1.0]))
+    speed = 0.4 * np.array([-1.0, 1.0]) if turns else np.array([0.0, 0.1])
+    rows = side * np.append(speed, 1.5)[:, None, None]  # 0.4 t (1 - t), or 0.1 t
+    (use,) = approach_uses(np.array([0.0, 1.0]), rows, limits)
+    assert use.used > 1e6
+    assert (use.velocity * side, use.limit) == (pytest.approx(0.4 if turns else 0.1), 0.0)
+    used, _ = uses_of_pieces(rows, np.ones(1), limits, 1.0)
+    assert (used[0] > 1e6).tolist() == [side > 0, side < 0]
+    seconds = durations_at_limit(rows, np.ones(1), limits, 1e-3)
+    assert seconds == pytest.approx([0.5 if turns else 1.0], abs=1e-9)
+    rows[:2] *= -1.0
+    (leaves,) = approach_uses(np.array([0.0, 1.0]), rows, limits)
+    assert (leaves.used > 1e6) == turns  # and comes back in its second half

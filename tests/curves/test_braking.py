@@ -109,3 +109,16 @@ def test_acceleration_alone():
 def test_unlimited_acceleration():
     bounds = np.array([[-np.inf, 1.0], [-np.inf, np.inf], [-2.0, 2.0]])
     assert braking(5.0, 0.0, bounds).velocity == pytest.approx(2.0)  # 2 t^2 / 2 = 4
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("beyond", "brakes"), [(1e-13, False), (1e-10, True), (1e-7, True)])
+def test_what_is_beyond_a_bound_by_more_than_rounding_is_beyond(beyond, brakes, side):
+    """Bounds that differ by direction; a velocity that the acceleration carries there, and one that is there."""
+    bounds = np.array([[-3.0, 2.0], [-5.0, 4.0], [-20.0, 10.0]])
+    bound = 2.0 if side > 0 else 3.0
+    carried = braking(side * (bound * (1 + beyond) - 1.0**2 / 20.0), side, bounds)
+    assert bool(carried.phases) == brakes
+    there = braking(side * bound * (1 + beyond), 0.0, bounds)
+    assert bool(there.phases) == brakes
+    assert abs(there.fastest) == pytest.approx(bound, rel=1e-6)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.curves.piecewise import PiecewisePolynomial, concatenate
+from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, distinct, increasing
 
 
 def drawn(seed, pieces):
@@ -85,3 +85,73 @@ def test_joined_curves_are_each_other_after_another():
         rtol=1e-9,
         atol=1e-9,
     )
+
+
+def test_numbers_without_repeats_keep_those_that_differ_by_a_bit():
+    one = np.nextafter(1.0, 2.0)
+    assert distinct(np.array([3.0, 1.0, one, 1.0, 3.0, -2.0])).tolist() == [-2.0, 1.0, one, 3.0]
+    assert distinct(np.empty(0)).size == 0
+
+
+def test_breaks_that_rounding_made_equal_are_the_next_numbers():
+    one = np.nextafter(1.0, 2.0)
+    assert increasing(np.array([0.0, 1.0, 1.0, 1.0, 2.0])).tolist() == [
+        0.0,
+        1.0,
+        one,
+        np.nextafter(one, 2.0),
+        2.0,
+    ]
+    assert increasing(np.array([1.0, 0.9])).tolist() == [1.0, one]
+
+
+@pytest.mark.parametrize(
+    ("breaks", "why"),
+    [
+        ([0.0, 1.0, 1.0], "strictly increase"),
+        ([0.0, 2.0, 1.0], "strictly increase"),
+        ([1.0, 0.0], "strictly increase"),
+        ([0.0, np.nan, 1.0], "finite"),
+        ([0.0, np.inf], "finite"),
+        ([-np.inf, 0.0], "finite"),
+    ],
+)
+def test_breaks_that_are_none_are_refused(breaks, why):
+    with pytest.raises(ValueError, match=why):
+        PiecewisePolynomial(breaks, np.zeros((2, len(breaks) - 1, 1)))
+    assert PiecewisePolynomial([1.0, 1.0], np.zeros((2, 1, 1))).duration == 0.0
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("place", [(0, 0, 0), (1, 1, 1)])
+def test_coefficients_that_are_no_numbers_are_refused(place, wrong):
+    rows = np.zeros((2, 2, 2))
+    rows[place] = wrong
+    with pytest.raises(ValueError, match="finite"):
+        PiecewisePolynomial([0.0, 1.0, 2.0], rows)
+
+
+def test_the_border_of_a_curve_that_ends_at_zero_is_as_wide_as_at_its_start():
+    """It begins at -1e6: times there are rounded by 1e-10, and those at its end are as uncertain."""
+    curve = PiecewisePolynomial([-1e6, 0.0], np.array([1.0, 0.0])[:, None, None])
+    assert curve.evaluate([-1e6 - 2e-10, 2e-10])[:, 0].tolist() == [0.0, 1e6]
+    with pytest.raises(ValueError, match="outside"):
+        curve.evaluate([1e-8])
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_many_rows_of_many_pieces_are_all_there(side, monkeypatch):
+    monkeypatch.setattr("trajcli.curves.piecewise._ROWS", 16)
+    _, curve = drawn(4, 40)
+    t = np.sort(np.concatenate([np.linspace(curve.start, curve.end, 50), curve.breaks[1:-1]]))
+    rows = curve.evaluate(t, 1, side=side)
+    one_by_one = np.array([curve.evaluate(each, 1, side=side) for each in t])
+    np.testing.assert_allclose(rows, one_by_one, rtol=1e-12, atol=1e-12)
+
+
+def test_ends_of_pieces_are_what_either_side_of_a_break_says():
+    _, curve = drawn(6, 5)
+    for order in range(4):
+        begins, ends = curve.piece_ends(order)
+        np.testing.assert_allclose(begins, curve.evaluate(curve.breaks[:-1], order, side="right"), rtol=1e-12)
+        np.testing.assert_allclose(ends, curve.evaluate(curve.breaks[1:], order, side="left"), rtol=1e-9)
