@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -13,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import trajcli
+from tests.cli.running import run
 from trajcli.api.plans import _is_yaml
 from trajcli.streams.reading import read_table
 
@@ -185,7 +187,21 @@ def test_a_plan_saves_itself(tmp_path: Path) -> None:
     with pytest.raises(trajcli.VerificationError, match="reaches 45 deg/s"):
         wrong.save(tmp_path / "wrong.csv")
     assert [file.name for file in tmp_path.iterdir()] == ["rows.csv"]
-    assert plan.report().verdict == "verified"
+
+
+@pytest.mark.parametrize(("name", "consumer"), [("trapezoid", None), ("sync", None), ("septic", "ros-jtc")])
+def test_a_report_is_that_of_the_command(name: str, consumer: str | None, tmp_path: Path) -> None:
+    """Rows that are joined, and rules of the consumer, stand in it, too."""
+    report = tmp_path / "report.json"
+    options = ("--rate", "30") if consumer is None else ("--for", consumer)
+    command = ["plan", str(EXAMPLES / f"{name}.yaml"), "--no-output", "-q", "--report", str(report), *options]
+    assert run(*command).code == 0
+    overrides = ["output.rate=30"] if consumer is None else []
+    made = trajcli.plan(EXAMPLES / f"{name}.yaml", overrides=overrides, consumer=consumer).report()
+    assert json.loads(made.model_dump_json()) == json.loads(report.read_text("utf-8"))
+    assert made.verdict == "verified"
+    assert made.rows is not None
+    assert (made.consumer is None) == (consumer is None)
 
 
 @pytest.mark.parametrize("ending", ["csv", "mcap", "jsonl", "yaml"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from line_of_ur5e import JOB, plan
 from recorded_rows import part
 
 import trajcli
+from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.recorded_tool import ToolJudge
@@ -66,7 +68,7 @@ def test_a_branch_flip_is_found(by_job: bool) -> None:
     assert judgement.verdict == "exceeded"
     assert {each.row for each in found} & {200, 201}
     assert all(abs(each.time - 200 * PERIOD) <= 1.01 * PERIOD for each in found)
-    assert not [each for each in judgement.findings if each.kind == "deviation"]
+    assert not [each for each in judgement.errors if each.kind == "deviation"]
 
 
 def test_a_tool_beside_its_line_is_found_by_how_much() -> None:
@@ -204,7 +206,7 @@ def test_a_path_that_ends_where_it_starts_is_followed_from_place_to_place() -> N
         motion = RecordedMotion(
             rows.t + 3.0, np.round(q, 9), None, None, None, None, moves, None, resolution, "rows"
         )
-        found = judge_motion(lambda: [motion], required).findings
+        found = judge_motion(lambda: [motion], required).errors
         return [(each.row, each.value) for each in found if each.kind == "deviation"]
 
     assert deviations(rows.q) == []
@@ -234,3 +236,36 @@ def test_a_path_that_turns_back_is_followed_around_its_corner(back: list[float])
     q, row = rows.q.copy(), len(rows) // 2 + 20  # behind the corner: a fault there is on neither side
     q[row] += np.linalg.solve(trajcli.load_robot("ur5e").jacobian(q[row]), [0.0, 0.0, 3e-5, 0.0, 0.0, 0.0])
     assert max(value or 0.0 for value in deviations(q, rows.qd)) == pytest.approx(3e-5, rel=0.05)
+
+
+HALF_CIRCLE = """
+version: 1
+robot: {file: GANTRY}
+start: {joints: [0, 0.5, 1]}
+moves: [{planner: arc, center: [0, 0, 1], axis: [-1, 0, 0], angle: 3.141592653589793, law: {duration: 2, speed: 1}}]
+output: {rate: 20, columns: [t, q, move]}
+"""
+
+
+def test_straight_lines_between_rows_leave_an_arc_by_the_height_of_their_chords(tmp_path: Path) -> None:
+    """Slides move the tool itself, so that a chord of the angle d is r (1 - cos(d / 2)) inside of the arc."""
+    gantry = Path(__file__).parents[2] / "examples" / "robots" / "gantry.yaml"
+    job, whole, half = tmp_path / "job.yaml", tmp_path / "whole.csv", tmp_path / "half.csv"
+    job.write_text(HALF_CIRCLE.replace("GANTRY", str(gantry)), "utf-8")
+    made, options = trajcli.plan(str(job)), CheckOptions(job=str(job))
+    made.save(str(whole))
+    names, *lines = whole.read_text("utf-8").splitlines(keepends=True)
+    half.write_text("".join([names, *lines[:2], *lines[2::2]]), "utf-8")
+    heights = 0.5 * (1 - np.cos(np.array([0.05, 0.1]) / 0.5 / 2))
+
+    judgement = check_file(str(whole), options).judgement
+    assert (judgement.verdict, judgement.planned_rows) == ("satisfied", True)
+    found = only(judgement, "deviation")
+    assert (found.severity, found.value) == ("warning", pytest.approx(heights[0], abs=2e-6))
+    (joined,) = [each.message for each in made.report().events if each.kind == "joined_over_limit"]
+    for said in (*judgement.events, joined.partition(";")[0]):
+        assert float(said.rsplit(" ", 1)[-1]) == pytest.approx(heights[0] / 1e-6, rel=0.01)
+
+    judgement = check_file(str(half), options).judgement
+    assert (judgement.verdict, judgement.planned_rows) == ("exceeded", False)
+    assert only(judgement, "deviation").value == pytest.approx(heights[1], abs=2e-6)

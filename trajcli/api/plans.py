@@ -57,10 +57,10 @@ class PlannedJob(Plan):
         write_plan(self, str(path), digits or self.digits)
 
     def report(self) -> Report:
-        """Return the report, as `trajcli plan --report` writes it."""
-        from trajcli.output.report import report_of
+        """Return the report, as `trajcli plan --report` writes it beside rows as CSV."""
+        from trajcli.output.delivery.delivered import report_as_delivered
 
-        return report_of(self)
+        return report_as_delivered(self)
 
     def _repr_svg_(self) -> str:
         """Return a picture of the plan: notebooks show it."""

@@ -83,9 +83,8 @@ def pair_columns(a: Table, b: Table) -> tuple[tuple[Pair, ...], tuple[tuple[str,
         )
     for pair in pairs:
         if {pair.a.unit, pair.b.unit} == {"deg", "mm"}:
-            raise InputError(
-                f"{pair.a.name} in {a.file} and {pair.b.name} in {b.file} are an angle and a length"
-            )
+            kinds = "an angle and a length" if pair.a.unit == "deg" else "a length and an angle"
+            raise InputError(f"{pair.a.name} in {a.file} and {pair.b.name} in {b.file} are {kinds}")
     in_b = set(partners.values())
     missing = [(name, 1) for name in a.names if name not in partners]
     missing += [(name, 0) for name in b.names if name not in in_b]

@@ -96,7 +96,7 @@ class ToolJudge:
         if path is not None and since is not None:
             path.see_between(window, pieces, since)
         elif path is not None:
-            path.see(window, pieces)
+            path.see(window, pieces, asked=asked)
         if since is None and (self._paths is None or path is not None):
             self._judge_singularity(window, pieces, robot, move)
 

@@ -11,7 +11,7 @@ from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, horner
 from trajcli.errors import Amount
 from trajcli.findings import Certainty, Collector, Finding, at_time
-from trajcli.judge.intervals import Intervals
+from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.dexterity import changes_of_sign, characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -54,8 +54,11 @@ class RecordedPath:
         self._fast = float(peaks(motion.law, (1,))[0].magnitude[0])
         self._before: tuple[float, Array, float] | None = None  # place, coordinates and time of a row
 
-    def see(self, window: Intervals, pieces: slice) -> None:
-        """Judge the rows of some pieces, and the middle between them where the curve is no straight line."""
+    def see(self, window: Intervals, pieces: slice, *, asked: bool) -> None:
+        """Judge the rows of some pieces, and the middle between them.
+
+        Straight lines of joints between rows that stand dense, for which nobody asked, are only warned of.
+        """
         last = pieces.stop + (window.ends and pieces.stop == window.last)
         q = np.asarray(window.states[0])
         for low in range(pieces.start, last, _ROWS):
@@ -64,10 +67,13 @@ class RecordedPath:
             along = self._judge(q[rows], window.t[rows], window.rows[rows], slack)
             kept = (rows < pieces.stop) & (window.moves[np.minimum(rows + 1, window.last)] == self._move)
             inner, along = rows[kept], along[kept]
-            if int(window.highest[pieces].max(initial=0)) > 1 and inner.size:
+            degree = int(window.highest[pieces].max(initial=0))
+            if degree > 0 and inner.size:
                 half = 0.5 * window.lengths[inner]
                 middle = horner(window.coefficients[:, inner], half[:, None])
-                self._judge(middle, window.t[inner] + half, window.rows[inner], slack[kept], (along, half))
+                warned = degree == 1 and not asked and 2.0 * half.max() <= DENSE
+                t, rows = window.t[inner] + half, window.rows[inner]
+                self._judge(middle, t, rows, slack[kept], (along, half), warned=warned)
 
     def see_between(self, window: Intervals, pieces: slice, since: Array) -> None:
         """Judge the middles of pieces that begin in places of the planned motion.
@@ -96,6 +102,8 @@ class RecordedPath:
         numbers: NDArray[np.int64],
         slack: Array,
         before: tuple[Array, Array] | None = None,
+        *,
+        warned: bool = False,
     ) -> Array:
         """Judge rows, or what lies behind rows of known s by some seconds; return their s (N,)."""
         poses, jacobians = linearisation(self._robot, q)
@@ -103,7 +111,7 @@ class RecordedPath:
         sizes, limits = self._sizes(s, poses), self._limits
         self._across_corners(s, sizes, poses)
         for quantity, size, limit in zip(("position", "orientation"), sizes.T, limits, strict=True):
-            self._add(quantity, size, limit, t, numbers, slack)
+            self._add(quantity, size, limit, (t, numbers, slack), warned=warned)
         target = self._path.at_s(s, "right").target()
         of_rows = determinants(target, poses, jacobians, self._arm)
         if of_rows is not None:
@@ -211,35 +219,23 @@ class RecordedPath:
         return np.asarray(0.5 * sum(axes))
 
     def _add(
-        self, quantity: str, sizes: Array, limit: float, t: Array, numbers: NDArray[np.int64], slack: Array
+        self,
+        quantity: str,
+        sizes: Array,
+        limit: float,
+        rows: tuple[Array, NDArray[np.int64], Array],
+        *,
+        warned: bool,
     ) -> None:
-        over = np.flatnonzero(exceeds(sizes, limit))
+        t, numbers, slack = rows
+        over = np.flatnonzero(exceeds(sizes, limit + slack if warned else limit))
         if not over.size:
             return
-        dimension: Literal["length", "angle"] = "length" if quantity == "position" else "angle"
 
         def make(k: int) -> Finding:
             row = over[k]
-            value, time = float(sizes[row]), float(t[row])
-            what = "is beside" if quantity == "position" else "is turned from"
-            return Finding(
-                rule="path",
-                severity="error",
-                kind="deviation",
-                joint=None,
-                value=value,
-                limit=limit,
-                time=time,
-                row=int(numbers[row]),
-                method="sampled",
-                quantity=quantity,
-                rounding=float(slack[row]),
-                message=f"the tool {what} its path by {{value}} {at_time(time)}, promised are {{limit}}",
-                amounts={
-                    "value": Amount(value, 0, None, dimension, "up"),
-                    "limit": Amount(limit, 0, None, dimension, "down"),
-                },
-            )
+            value, off = float(sizes[row]), float(slack[row])
+            return _deviation(quantity, value, limit, float(t[row]), int(numbers[row]), off)
 
         certain = sizes[over] - limit > slack[over]
         joints = np.full(over.size, -1)
@@ -255,6 +251,7 @@ class RecordedPath:
                 sizes[over],
                 make,
                 quantity=quantity,
+                severity="warning" if warned else "error",
                 certainty=certainty,
                 chosen=chosen,
             )
@@ -284,3 +281,27 @@ class RecordedPath:
             )
 
         self._worst.add("branch", self._move, np.full(changes.size, -1), np.ones(changes.size), make)
+
+
+def _deviation(quantity: str, value: float, limit: float, time: float, row: int, rounding: float) -> Finding:
+    """Return that the tool is beside its path, m, or turned from it, rad."""
+    dimension: Literal["length", "angle"] = "length" if quantity == "position" else "angle"
+    what = "is beside" if quantity == "position" else "is turned from"
+    return Finding(
+        rule="path",
+        severity="error",
+        kind="deviation",
+        joint=None,
+        value=value,
+        limit=limit,
+        time=time,
+        row=row,
+        method="sampled",
+        quantity=quantity,
+        rounding=rounding,
+        message=f"the tool {what} its path by {{value}} {at_time(time)}, promised are {{limit}}",
+        amounts={
+            "value": Amount(value, 0, None, dimension, "up"),
+            "limit": Amount(limit, 0, None, dimension, "down"),
+        },
+    )

@@ -8,6 +8,7 @@ from trajcli.job.read import LoadedJob
 from trajcli.planning.plan import Carried, Plan, plan_job
 
 if TYPE_CHECKING:
+    from trajcli.job.report import Report
     from trajcli.streams.decimals import Digits
     from trajcli.streams.formats import StreamFormat
 
@@ -69,6 +70,31 @@ def _refuse_events(plan: Plan) -> None:
         from trajcli.output.report import concession_error
 
         raise concession_error(plan)
+
+
+def report_as_delivered(plan: Plan) -> Report:
+    """Return the report of a plan, with that of its rows as CSV, as `trajcli plan --report` writes it."""
+    from trajcli.output.delivery.joined import joined_rows, rows_report, with_event
+    from trajcli.output.report import report_of
+    from trajcli.output.write import grid_of
+    from trajcli.streams.formats import DEFAULT
+
+    if not plan.verdict.passed:
+        return report_of(plan)
+    consumer = plan.loaded.job.output.consumer
+    if consumer is None:
+        rows = joined_rows(plan, grid_of(plan), DEFAULT)
+        plan, judged = with_event(plan, rows, DEFAULT)
+        said = {} if judged is None else {"rows": rows_report(rows, judged)}
+        return report_of(plan).model_copy(update=said)
+    from trajcli.consumers.judgement import load_profile
+    from trajcli.output.consumer import consumer_report
+    from trajcli.output.delivery.for_consumer import Writing, rows_for
+
+    made = rows_for(plan, load_profile(consumer), Writing(DEFAULT))
+    said = {} if made.joined is None else {"rows": rows_report(made.rows, made.joined)}
+    rules = {} if made.rules is None else {"consumer": consumer_report(plan, made.rules)}
+    return report_of(plan).model_copy(update={**said, **rules})
 
 
 def plan_of(loaded: LoadedJob, profile: str | None = None, carried: Carried | None = None) -> Plan:

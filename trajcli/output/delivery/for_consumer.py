@@ -229,6 +229,11 @@ def plan_for(
     return replace(made, said=(*said, *made.said))
 
 
+def rows_for(plan: Plan, profile: Profile, writing: Writing) -> ForConsumer:
+    """Return what its consumer makes of a plan that was made for it, limits and rules."""
+    return _Search(plan.loaded, profile, writing, None).judged(plan, by_rules=True)
+
+
 def refusal(made: ForConsumer, remedies: Iterable[str]) -> VerificationError:
     """Return why rows are not written for a consumer: what is worst, and what helps."""
     plan = made.plan
@@ -256,9 +261,9 @@ class _Search:
         self, loaded: LoadedJob, adapted: Adaptation | None = None, *, rules: bool = False
     ) -> ForConsumer:
         """Return a plan with what its consumer makes of it."""
-        return self._judged(plan_job(loaded, self._carried, adapted=adapted), by_rules=rules)
+        return self.judged(plan_job(loaded, self._carried, adapted=adapted), by_rules=rules)
 
-    def _judged(self, plan: Plan, *, by_rules: bool = False) -> ForConsumer:
+    def judged(self, plan: Plan, *, by_rules: bool = False) -> ForConsumer:
         """Return what the consumer makes of a plan; by rules only where rows keep the limits, or as asked."""
         # the curve is judged by exact numbers; what their decimals make of it is looked at apart
         writing, grid, digits = self._writing, grid_of(plan), self._writing.digits or "fixed"
@@ -284,7 +289,7 @@ class _Search:
             if self._profile.rows.rate is not None and {*other.output} != {"columns"}:
                 continue
             job = loaded.job.model_copy(update={"output": output.model_copy(update=other.output)})
-            found = self._judged(replace(made.plan, loaded=replace(loaded, job=job)))
+            found = self.judged(replace(made.plan, loaded=replace(loaded, job=job)))
             if found.clean:
                 words = ["rows at its knots"] if "rows" in other.output else []
                 words += [f"rows at {other.output['rate']:g} Hz"] if "rate" in other.output else []
