@@ -414,3 +414,38 @@ def test_a_branch_and_a_bound_have_the_times_of_the_whole():
     )
     assert there.time == pytest.approx(here.time + 1.5, abs=1e-9)
     assert here.time == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_tool_beside_its_path_between_the_rows_is_found_by_its_bound():
+    """The first joint leaves by a polynomial that is zero at all rows of one piece, and three tolerances between."""
+    curve = RIGHT.trajectory.curve
+    piece, rows = curve.pieces // 2, np.linspace(0, 1, 9)
+    length = np.diff(curve.breaks)[piece]
+    bump = np.poly1d(rows, r=True)
+    dense = np.linspace(0, 1, 4001)
+    radius = np.linalg.norm(forward(RIGHT.robot, curve.evaluate(curve.breaks[piece]))[:2, 3])
+    bump *= 3e-6 / radius / np.abs(bump(dense)).max()
+    coefficients = np.pad(curve.coefficients, ((10 - len(curve.coefficients), 0), (0, 0), (0, 0)))
+    coefficients[:, piece, 0] += bump.coefficients / length ** np.arange(9, -1, -1)
+    moved = trajectory_of(RIGHT.robot, PiecewisePolynomial(curve.breaks, coefficients))
+    rows_of_tool = dataclasses.replace(RIGHT, trajectory=moved)
+    assert rows_of_tool.deviation[0].max() < 1e-7
+    beside, turned = check_tool(rows_of_tool)
+    for found, kind, value in (
+        (beside, "tool_path", 3e-6),
+        (turned, "tool_orientation", 3e-6 / radius),
+    ):
+        assert (found.kind, found.method, found.limit) == (kind, "bounded", 1e-6)
+        assert found.value == pytest.approx(value, rel=0.02)
+        assert curve.breaks[piece] <= found.time <= curve.breaks[piece + 1]
+
+
+def test_what_is_judged_on_rows_alone_is_named():
+    """No determinant tells branches apart where a turn is free, and the angle of a yaw has no majorant."""
+    motion = RIGHT.motion
+    free, yaw = (dataclasses.replace(motion.path, orientation=which) for which in ("direction", "yaw"))
+    freely = motion_along(free, motion.law, motion.breaks, motion.tolerance)
+    assert list(RIGHT.sampled) == ["branch"]
+    assert list(dataclasses.replace(RIGHT, motion=freely).sampled) == []
+    by_yaw = dataclasses.replace(RIGHT, motion=dataclasses.replace(motion, path=yaw))
+    assert list(by_yaw.sampled) == ["angle from its orientation", "branch"]
