@@ -52,7 +52,8 @@ path and 0.8 across where a path is bent anywhere (`time_optimal` divides it poi
 _TOLERANCE = """\
 How near the joints' curve comes to the exact one; velocities and accelerations likewise, as a part of their
 peaks. Finer means more pieces: at most 4096 for a move, and 256 more
-for each place where path or law change."""
+for each place where path or law change. Where `limits.tcp` has limits, the curve comes as near as 1e-6
+whatever is said here: else a tool whose law is at a limit would be above it."""
 
 _SEGMENTS = """\
 A segment begins where the one before it ends. `radius` is the length before and after the corner at its end

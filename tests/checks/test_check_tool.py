@@ -185,6 +185,14 @@ def test_a_limit_below_the_laws_own_peak_is_broken(kind):
     assert judged(with_limits(RIGHT, **{name: peak * (1 + 1e-4)})) == []
 
 
+@pytest.mark.parametrize("kind", LAWS)
+def test_no_tolerance_of_the_path_is_one_of_a_limit(kind):
+    """A tool that may be a centimetre beside its path may not be a part in a hundred above its limits."""
+    name, peak, _ = LAWS[kind]
+    (found,) = judged(with_limits(moving(tolerance=1e-2), **{name: peak * 0.99}))
+    assert found.kind == kind
+
+
 @pytest.mark.parametrize(("kind", "part"), [("tool_speed", 1), ("tool_acceleration", 2)])
 def test_peaks_are_those_of_a_dense_sampling(kind, part):
     (found,) = judged(with_limits(RIGHT, **{LAWS[kind][0]: 0.01}))

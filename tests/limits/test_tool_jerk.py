@@ -6,9 +6,7 @@ A link of length L that turns by q has |p'''|^2 = L^2 ((q''' - q'^3)^2 + (3 q' q
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,10 +17,6 @@ from tiers import few
 
 from trajcli.job.report import Report
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
-from trajcli.limits.tool import ToolSurvey
-from trajcli.limits.tool_bound import ToolPeak
 from trajcli.output.report import report_of
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
@@ -118,25 +112,6 @@ def test_a_step_is_found_when_it_is() -> None:
     assert abs(steps[1] - steps[0]) > 90
 
 
-def test_what_a_tolerance_lets_a_tool_be_off_is_no_excess_of_its_jerk() -> None:
-    """Off by e x^3 (1 - x)^3 of pieces of a length h, third over second derivative are 16 / h: by polynomials."""
-    hump = -np.poly([0.0] * 3 + [1.0] * 3)
-    x = np.linspace(0, 1, 100_001)
-    second, third = (np.abs(np.polyval(np.polyder(hump, k), x)).max() for k in (2, 3))
-    spacing, tolerance, acceleration, limit = 0.02, 1e-4, 3.0, 40.0
-    tcp = ToolLimits(acceleration=5.0, jerk=limit)
-    path: Any = SimpleNamespace(tolerance=Tolerance(tolerance, tolerance))
-    arm = Robot("arm", (Joint("a"),), replace(unlimited(1), tcp=tcp), None, np.eye(4), np.eye(4))
-    allowed = 2 * (third / second) / spacing * tolerance * acceleration / limit
-    for share, count in ((0.98, 0), (1.03, 1)):
-        peaks = {
-            "acceleration": ToolPeak(acceleration, 0.1, acceleration, np.zeros(3)),
-            "jerk": ToolPeak(limit, 0.1, limit * (1 + share * allowed), np.zeros(3)),
-        }
-        survey = ToolSurvey(arm.limits, peaks, motion=path, spacing=spacing)
-        assert len(list(survey.over(arm))) == count
-
-
 def test_speeds_are_reported_where_no_limit_is_stated() -> None:
     plan = plan_job(
         loaded({**JOB_ON_PATH, "moves": [PATHS["line"] | {"law": {"shape": "quintic", "duration": 3}}]})
@@ -225,3 +200,16 @@ def test_recorded_rows_are_judged_by_it(key: str, tmp_path: Path) -> None:
         job.write_text(json.dumps(link({key: part * peak}, {"duration": DURATION})))
         judged = check_file(str(file), CheckOptions(job=str(job))).judgement
         assert {finding.kind for finding in judged.findings if finding.severity == "error"} == kinds
+
+
+@pytest.mark.parametrize("planner", PATHS)
+def test_a_law_at_a_limit_keeps_it_whatever_the_tolerance_of_its_path_is(planner: str) -> None:
+    job = JOB_ON_PATH | {
+        "limits": {"acceleration": 200, "tcp": {"speed": 0.1, "acceleration": 1, "angular_speed": 9}},
+        "moves": [
+            PATHS[planner] | {"law": {"shape": "trapezoid"}, "tolerance": {"position": 1e-3, "angle": 1e-3}}
+        ],
+    }
+    plan = plan_job(loaded(job))
+    assert plan.verdict.passed
+    assert 1 - 1e-6 < used(plan, "speed") < 1 + 1e-6

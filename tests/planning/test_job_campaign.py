@@ -32,6 +32,13 @@ def test_a_verified_job_keeps_its_limits(number: int) -> None:
     campaign(few(range(number, 2 * len(PLANNERS), len(PLANNERS)), 1))
 
 
+def test_the_whole_jerk_of_the_tool_is_kept_where_that_along_the_path_is_at_its_limit() -> None:
+    """A time-optimal path on a Panda: verified, it was 2.3e-4 above its limit where the path is bent."""
+    figures = campaign([2293])
+    assert figures["path"] == 1
+    assert figures["of tool_jerk"] > 0.999
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("block", range(40))
 def test_ten_thousand_jobs(block: int, tally: Tally) -> None:

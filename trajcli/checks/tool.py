@@ -161,10 +161,9 @@ def _check_path(tool: SampledTool) -> list[Finding]:
 
 def _check_speeds(tool: SampledTool) -> Iterator[Finding]:
     """Yield the segments of the path on which the tool is faster than they allow."""
-    promised = (tool.motion.tolerance.position, tool.motion.tolerance.angle)
     for run in tool.speed_runs:
-        for kind, limit, peak, off in zip(SPEED_KINDS, run.limits, run.peaks, promised, strict=True):
-            if not peak.upper_bound <= limit * (1 + TOOL_RELATIVE + 2 * off):
+        for kind, limit, peak in zip(SPEED_KINDS, run.limits, run.peaks, strict=True):
+            if not peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
                 found = tool_excess(kind, peak.upper_bound, limit, tool.span.start + peak.time)
                 where = "segment {}" if run.segments[0] == run.segments[1] else "segments {} to {}"
                 message = f"{where.format(*run.segments)}: {found.message}"

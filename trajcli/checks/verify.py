@@ -72,7 +72,7 @@ class Verdict:
         Times count from the start of the move; None on a path, and where no limit asks for them.
         """
         surveys: list[Any] = [of_span.get("tool") for of_span in self.surveys]
-        return tuple(None if each is None or each.motion is not None else each.peaks for each in surveys)
+        return tuple(None if each is None or each.on_path else each.peaks for each in surveys)
 
     @cached_property
     def by_position(self) -> tuple[tuple[ApproachUse, ...], ...]:

@@ -47,8 +47,7 @@ TARGET_CLOSURE = 1e-8
 # tool's tolerance, which near a singularity is several times as much at a joint.
 TARGET_ON_PATH = 2e-5
 
-# The tool's speed and acceleration are those of its law as far as the joints' curve follows it, which comes
-# on top; their peaks are looked for between rows until they change by less than this.
+# The tool's peaks are looked for between rows until what is proven of them is above by less than this.
 TOOL_RELATIVE = 1e-6
 
 # What is proven of the distance from a path is above it by at most 0.002 of what was promised.

@@ -11,7 +11,6 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts
 from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
-from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.jacobian import jacobian, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.limits.kinds import TOOL_KINDS, LimitedMove, LimitFamily, LimitKind, LimitSurvey
@@ -22,8 +21,6 @@ from trajcli.trajectory import State, Trajectory
 _SMOOTH_HINT = (
     "use a planner or a law whose acceleration does not step, or leave the limit of the tool's {words} out"
 )
-_SEXTIC = 16.0
-"""Largest third over largest second derivative of x^3 (1 - x)^3, by which quintic pieces are off a curve."""
 
 
 @frozen
@@ -51,9 +48,7 @@ class ToolSurvey(LimitSurvey):
         steps: The largest steps of accelerations, where their derivatives are limited.
         begins: When the move begins, s from the start of the trajectory.
         moves: Whether it has a duration.
-        motion: The reference motion along a path; None in joint space. Speeds and accelerations may differ
-            from those of its law, which was planned within the limits, by as much as its tolerance says.
-        spacing: Mean length of the pieces of the joints' curve, s.
+        on_path: Whether the tool goes along a path.
     """
 
     limits: Limits
@@ -61,8 +56,7 @@ class ToolSurvey(LimitSurvey):
     steps: tuple[ToolStep, ...] = ()
     begins: float = 0.0
     moves: bool = True
-    motion: ToolMotion | None = None
-    spacing: float = np.inf
+    on_path: bool = False
 
     def over(self, joints: NamedJoints, origin: float = 0.0) -> Iterator[Finding]:
         """Yield the limits of the tool that the move does not keep."""
@@ -75,7 +69,7 @@ class ToolSurvey(LimitSurvey):
                 continue
             if stepping:
                 yield from (_stepping(step, kind, self.begins) for step in stepping)
-            elif not peak.upper_bound <= limit * (1 + TOOL_RELATIVE + 2 * self._promised(kind, limit)):
+            elif not peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
                 yield tool_excess(
                     kind, peak.upper_bound, limit, self.begins + peak.time, still=not self.moves
                 )
@@ -86,16 +80,6 @@ class ToolSurvey(LimitSurvey):
             return np.inf
         shares = (peak.upper_bound / float(getattr(self.limits.tcp, key)) for key, peak in self.peaks.items())
         return max(shares, default=0.0) - 1
-
-    def _promised(self, kind: LimitKind, limit: float) -> float:
-        """Return by what part of its peak, or of its limit, a quantity may differ from that of the law."""
-        if self.motion is None:
-            return 0.0
-        tolerance = getattr(self.motion.tolerance, "angle" if kind.dimension == "angle" else "position")
-        if kind.order != 3:
-            return float(tolerance)
-        (below,) = (each for each in TOOL_KINDS if (each.order, each.dimension) == (2, kind.dimension))
-        return float(_SEXTIC * tolerance * self.peaks[below.key].value / (self.spacing * limit))
 
 
 def _stepping(step: ToolStep, kind: LimitKind, begins: float) -> Finding:
@@ -166,17 +150,13 @@ class ToolFamily(LimitFamily):
 
     def survey(self, move: LimitedMove) -> ToolSurvey | None:
         """Return the largest speeds and accelerations of the tool; None where nothing can be judged of it."""
-        robot, motion, span = move.robot, move.motion, move.span
-        if robot is None or (motion is None and not limits_tool(robot)):
+        robot, span, on_path = move.robot, move.span, move.motion is not None
+        if robot is None or not (on_path or limits_tool(robot)):
             return None
         if not limits_tool(robot):
-            return ToolSurvey(robot.limits, {}, (), span.start, span.duration > 0, motion)
-        breaks, _ = move.pieces
-        spacing = span.duration / max(len(breaks) - 1, 1)
+            return ToolSurvey(robot.limits, {}, (), span.start, span.duration > 0, on_path)
         steps = tuple(_steps(move, robot)) if _order(robot.limits) > 2 else ()
-        return ToolSurvey(
-            robot.limits, peaks_in(move, robot), steps, span.start, span.duration > 0, motion, spacing
-        )
+        return ToolSurvey(robot.limits, peaks_in(move, robot), steps, span.start, span.duration > 0, on_path)
 
     def over_at_ends(self, robot: Robot | None, ends: Sequence[State], use: tuple[str, int, float]) -> bool:
         """Return whether the tool is too fast where a move begins or ends."""

@@ -25,6 +25,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
+from trajcli.limits.tool import limits_tool
 from trajcli.planners.planner import Event, Phase
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ _NEXT = 4e-6  # of the whole: how far beyond the failure the first of them is
 _SLOW = 20.0  # rad for each length of the arm: a joint that goes less is not near a singularity
 _REGULAR = 1e-3  # of the largest singular value: with more there is no singularity nearby
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
+_KEEPS_RATES = Tolerance()  # so near, a tool whose law is at a limit of its rates is not above it
 
 
 class UnreachablePathError(PlanningError):
@@ -342,6 +344,10 @@ def _fitted(
     tolerance: Tolerance,
     diagnosis: FollowingDiagnosis,
 ) -> PiecewisePolynomial:
+    if limits_tool(diagnosis.robot):
+        tolerance = Tolerance(
+            min(tolerance.position, _KEEPS_RATES.position), min(tolerance.angle, _KEEPS_RATES.angle)
+        )
     try:
         ratio = tolerance_ratio(exact, tolerance, breaks, guess(probes(breaks)))
         return fit(exact.joint_state, ratio, breaks, guess)

@@ -69,7 +69,7 @@ _ARRIVED = 1e-5  # rad or m: joint values that are given, and reached on the pat
 
 
 class ToleranceSpec(Model):
-    """How near the joints' curve must come to path and law."""
+    """How near the joints' curve must come to path and law; 1e-6 at most where the tool has limits."""
 
     position: Annotated[
         float,
