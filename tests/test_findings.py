@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from trajcli.errors import Amount, Place
-from trajcli.findings import Collector, Finding
+from trajcli.findings import Collector, Finding, excess_amounts
 
 GROUPS = (("error", "exceeded"), ("error", "within rounding"), ("warning", "exceeded"))
 
@@ -97,3 +97,77 @@ def test_a_message_in_other_units_keeps_the_unit_of_the_numbers() -> None:
     )
     said = wrong.said_by(lambda amount: f"{1000 * amount.value:g} mm/s")
     assert (said.text(), said.si_unit, said.value) == ("1000 mm/s", "m/s", 1.0)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_of_all_moves_together_the_worst_of_each_certainty_is_kept(seed: int) -> None:
+    """Blocks are moves: of each joint and each certainty the worst one, counted in the move in which it is."""
+    random = np.random.default_rng(seed)
+    joints, moves = random.integers(-1, 2, 40), np.sort(random.integers(-1, 3, 40))
+    excess, group = random.integers(-3, 4, 40) / 2.0, random.integers(0, 3, 40)
+    found = Collector(by_move=False)
+    for move, (k, (severity, certainty)) in product((-1, 0, 1, 2), enumerate(GROUPS)):
+        part = np.flatnonzero(moves == move)
+        found.add(
+            "velocity",
+            moves[part],
+            joints[part],
+            excess[part],
+            lambda row, part=part: finding(int(part[row])),
+            severity=severity,
+            certainty=certainty,
+            chosen=group[part] == k,
+        )
+    expected = set()
+    for joint, k in product((-1, 0, 1), range(3)):
+        alike = [row for row in range(40) if (joints[row], group[row]) == (joint, k)]
+        if alike:
+            worst = max(alike, key=lambda row: (excess[row], -row))
+            count = sum(moves[row] == moves[worst] for row in alike)
+            expected.add((worst, count, None if moves[worst] < 0 else moves[worst], *GROUPS[k]))
+    assert {(f.row, f.count, f.move, f.severity, f.certainty) for f in found.findings()} == expected
+
+
+@pytest.mark.parametrize(("offset", "part"), [(0, slice(0, 6)), (3, slice(3, 6))])
+def test_all_moves_of_one_block_have_one_worst(offset: int, part: slice) -> None:
+    moves, excess = np.array([0, 0, 0, 1, 1, 1])[part], np.array([1.0, 5.0, 2.0, 4.0, 3.0, 4.5])[part]
+    found = Collector(by_move=False)
+    found.add("velocity", moves, np.zeros(len(moves), dtype=int), excess, lambda row: finding(offset + row))
+    (worst,) = found.findings()
+    assert (worst.row, worst.count, worst.move) == ((1, 3, 0) if offset == 0 else (5, 3, 1))
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "excess"),
+    [
+        (3.0, 2.0, 1.5),
+        (-3.0, -2.0, 1.5),
+        (-3.0, 2.0, 1.5),
+        (1.0, 2.0, 0.5),
+        (3.0, 0.0, np.inf),
+        (None, 2.0, np.inf),
+    ],
+)
+def test_how_bad_a_finding_is_has_no_sign(value: float | None, limit: float, excess: float) -> None:
+    assert Finding("velocity", "j1", value, limit, 0.0).excess == excess
+    assert Finding("jump", "j1", value, limit, 0.0).excess == np.inf  # a jump has no ratio to what it may be
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_value_beyond_its_limit_is_printed_beyond_it(side: int, sign: int) -> None:
+    """Six digits make one number of both: they are rounded away from each other."""
+    limit = sign * 1.2345678
+    value = limit + side * 1e-9
+    amounts = excess_amounts(Arm, 1, 1, value, limit)
+    printed = [float(str(amounts[name]).split()[0]) for name in ("value", "limit")]
+    assert np.sign(printed[0] - printed[1]) == side
+    assert side * (printed[0] - value) >= 0 >= side * (printed[1] - limit)
+    assert (amounts["joint"], amounts["value"].dimension) == ("b", "length")
+
+
+class Arm:
+    """Two joints, the second of which slides."""
+
+    joint_names = ("a", "b")
+    joint_types = ("revolute", "prismatic")

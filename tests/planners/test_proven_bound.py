@@ -25,6 +25,12 @@ from trajcli.planners.flying_by.proven_bound import (
 from trajcli.planners.flying_by.within_limits import FlownChain
 from trajcli.planning.plan import Plan, plan_job
 
+UNEQUAL = {
+    "velocity": [[-3.0, 2.0], [-1.5, 3.0]],
+    "acceleration": [[-5.0, 8.0], [-8.0, 4.0]],
+    "jerk": [[-60.0, 40.0], [-50.0, 80.0]],
+}
+"""Limits that differ by direction, of either joint otherwise."""
 INTERVALS, FINE = 3, 16  # of a part; fine steps of each interval, which meet the switches at quarters
 
 
@@ -139,7 +145,8 @@ def test_a_motion_obeys_every_row_in_every_box_around_it(seed: int) -> None:
     """Secants, products and orders: a motion that exists is in no box refuted."""
     rng = np.random.default_rng(seed)
     fast = [2.1, 1.2], [2.1, 2.9]  # joints that reach their velocity
-    plan = planned(*fast) if seed % 2 else planned([0.9, 0.8], [0.2, 1.5], zone=0.05)
+    limits = {} if seed % 4 < 2 else {"limits": UNEQUAL}
+    plan = planned(*fast, **limits) if seed % 2 else planned([0.9, 0.8], [0.2, 1.5], zone=0.05, **limits)
     chain = chain_of_plan(plan)
     programme = ShareProgramme(chain.chain, 5, 4)
     found, shares = states_of(chain, programme)
@@ -175,6 +182,24 @@ def test_next_to_the_fastest_motion_the_bound_is_next_to_it(
     for guess in (0.95, 0.98, 1.0):
         least = programme.least_duration(box, guess * chain.duration, 2 * chain.duration)
         assert 0.975 * chain.duration <= least <= chain.duration
+
+
+@pytest.mark.parametrize("targets", [([0.9, 0.8], [0.2, 1.5]), ([-0.6, 1.9], [0.4, 2.1])])
+def test_a_law_along_a_line_has_the_limits_of_the_direction_of_each_joint(targets) -> None:
+    """The largest s' and the rates of it in both directions: what the first joint that reaches a limit has left."""
+    chain = chain_of_plan(planned(*targets, zone=0.05, limits=UNEQUAL)).chain
+    variables = ShareProgramme(chain, 4, 3).variables
+    for course, variable in zip(chain.courses, (variables[0], variables[-1]), strict=True):
+        direction = course.curve.coefficients[0, 0]
+        for order, kind in enumerate(UNEQUAL):
+            pairs = [
+                pair if rate > 0 else pair[::-1] for rate, pair in zip(direction, UNEQUAL[kind], strict=True)
+            ]
+            low, high = (
+                [pair[side] / rate for rate, pair in zip(direction, pairs, strict=True)] for side in (0, 1)
+            )
+            wanted = [max(low) if order else 0.0, min(high)]
+            np.testing.assert_allclose(variable.bounds[order], wanted, rtol=1e-12)
 
 
 def test_collinear_moves_are_bounded_by_one_move_of_the_whole_way(few_programmes: None) -> None:

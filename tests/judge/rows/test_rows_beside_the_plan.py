@@ -99,17 +99,46 @@ def test_full_digits_are_off_by_what_no_processor_makes(column: int, plan: Plan,
     assert compared(tmp_path, plan, rows, ".17g").planned
 
 
+def in_milliseconds(folder: Path, plan: Plan, rows: Rows) -> RowComparison:
+    """Return what a comparison says of rows whose stamps show three decimals, and values nine."""
+    lines = (",".join([f"{row[0]:.3f}", *(f"{value:.9f}" for value in row[1:])]) for row in rows.tolist())
+    (folder / "rows.csv").write_text("\n".join([",".join(NAMES), *lines]) + "\n", encoding="utf-8")
+    return compare_with_plan(ByteSource(str(folder / "rows.csv")), plan)
+
+
 @pytest.mark.parametrize("late", [0.4e-3, -0.4e-3, 2e-3, -2e-3])
 def test_stamps_of_three_decimals_stand_for_half_a_millisecond(
     late: float, plan: Plan, tmp_path: Path
 ) -> None:
-    """Rows at the rate 1/0.15 Hz: values of nine decimals from beside their stamps, which show three."""
-    rows, file = rows_at(1 / 0.15, late), tmp_path / "rows.csv"
+    """Rows at the rate 1/0.15 Hz: values from beside their stamps. One that is off stays off among them."""
+    rows = rows_at(1 / 0.15, late)
     rows[0], rows[-1] = rows_at(1 / 0.15)[[0, -1]]
-    lines = (",".join([f"{row[0]:.3f}", *(f"{value:.9f}" for value in row[1:])]) for row in rows.tolist())
-    file.write_text("\n".join([",".join(NAMES), *lines]) + "\n", encoding="utf-8")
-    found = compare_with_plan(ByteSource(str(file)), plan)
-    assert found.planned is (abs(late) < 0.5e-3)
+    assert in_milliseconds(tmp_path, plan, rows).planned is (abs(late) < 0.5e-3)
+    for row in range(1, len(rows) - 1):
+        wrong = rows.copy()
+        wrong[row, 3] += 0.01
+        found = in_milliseconds(tmp_path, plan, wrong)
+        assert not found.planned
+        assert abs(late) > 0.5e-3 or f"row {row + 1} has" in (found.difference or "")
+
+
+@pytest.mark.parametrize(("share", "planned"), [(0.0, True), (0.5, False), (1.0, True)])
+def test_where_the_acceleration_steps_a_row_has_one_of_both(
+    share: float, *, planned: bool, tmp_path: Path
+) -> None:
+    """A trapezoid of 1 rad/s and 4 rad/s^2: at 0.25 s the acceleration goes from 4 to 0 at once, and has no mean."""
+    fields = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0.0]}, "output": {"rate": 8}}
+    fields |= {"limits": {"velocity": 9, "acceleration": 90, "jerk": None}}
+    move = {"planner": "trapezoid", "to": {"joints": [1.0]}, "velocity": 1.0, "acceleration": 4.0}
+    plan = plan_job(random_jobs.loaded(fields | {"moves": [move]}))
+    t = np.arange(11) / 8
+    past = np.clip(t[:, None] - [0.0, 0.25, 1.0, 1.25], 0.0, None)
+    signs = np.array([1.0, -1.0, -1.0, 1.0])
+    after = t[:, None] + 1e-12 >= [0.0, 0.25, 1.0, 1.25]
+    rows = np.stack([t, 2.0 * past**2 @ signs, 4.0 * past @ signs, 4.0 * after @ signs], axis=1)
+    rows[-1, 3] = -4.0  # at the end that before it
+    rows[2, 3] = 4.0 * share
+    assert compared(tmp_path, plan, rows, names=["t", "q1", "qd1", "qdd1"]).planned is planned
 
 
 def test_columns_may_stand_in_any_order_but_not_for_each_other(plan: Plan, tmp_path: Path) -> None:
@@ -121,23 +150,38 @@ def test_columns_may_stand_in_any_order_but_not_for_each_other(plan: Plan, tmp_p
         assert not compared(tmp_path, plan, rows, names=swapped).planned
 
 
+def message(folder: Path, names: list[str], rows: Rows) -> ByteSource:
+    """Return a message of ROS that holds rows, with stamps to the nanosecond."""
+    points = [
+        {
+            "positions": row[1:4],
+            "velocities": row[4:7],
+            "accelerations": row[7:],
+            "time_from_start": dict(zip(("sec", "nanosec"), divmod(round(row[0] * 1e9), 10**9), strict=True)),
+        }
+        for row in rows.tolist()
+    ]
+    (folder / "rows.yaml").write_text(json.dumps({"joint_names": names, "points": points}))
+    return ByteSource(str(folder / "rows.yaml"))
+
+
 def test_joints_of_a_message_have_the_names_of_the_job(plan: Plan, tmp_path: Path) -> None:
     names = list(plan.loaded.robot.joint_names)
     for order in ([0, 1, 2], [2, 1, 0], [0, 2, 1]):
-        points = [
-            {
-                "positions": row[1:4],
-                "velocities": row[4:7],
-                "accelerations": row[7:],
-                "time_from_start": dict(
-                    zip(("sec", "nanosec"), divmod(round(row[0] * 1e9), 10**9), strict=True)
-                ),
-            }
-            for row in rows_at().tolist()
-        ]
-        file = tmp_path / "rows.yaml"
-        file.write_text(json.dumps({"joint_names": [names[k] for k in order], "points": points}))
-        assert compare_with_plan(ByteSource(str(file)), plan).planned is (order == [0, 1, 2])
+        source = message(tmp_path, [names[k] for k in order], rows_at())
+        assert compare_with_plan(source, plan).planned is (order == [0, 1, 2])
+
+
+@pytest.mark.parametrize(
+    ("late", "planned"), [(0.4e-9, True), (-0.4e-9, True), (5e-9, False), (-5e-9, False)]
+)
+def test_stamps_of_messages_stand_for_half_a_nanosecond(
+    late: float, *, planned: bool, plan: Plan, tmp_path: Path
+) -> None:
+    rows = rows_at(10.0, late)
+    rows[[0, -1]] = rows_at()[[0, -1]]
+    source = message(tmp_path, list(plan.loaded.robot.joint_names), rows)
+    assert compare_with_plan(source, plan).planned is planned
 
 
 def _gone(rows: Rows) -> Rows:
@@ -165,6 +209,14 @@ def test_stamps_that_are_not_all_times_of_the_rate(
     fault: Callable[[Rows], Rows], plan: Plan, tmp_path: Path
 ) -> None:
     assert not compared(tmp_path, plan, fault(rows_at())).planned
+
+
+@pytest.mark.parametrize("pause", [slice(4096, 8192), slice(8192, -1)])
+def test_no_block_of_rows_is_late_as_a_whole(pause: slice, plan: Plan, tmp_path: Path) -> None:
+    """Stamps of 4096 rows that follow each other are 10 us late, less than a tenth of their period."""
+    rows = rows_at(8000.0)[:, [0, 3]]
+    rows[pause, 0] += 1e-5
+    assert not compared(tmp_path, plan, rows, ".6f", ["t", "q3"]).planned
 
 
 @pytest.mark.parametrize("row", [3, 4095, 4096, 5000, 8191, 8192, -1])
