@@ -128,3 +128,39 @@ def test_what_rounding_leaves_is_no_jump(sign):
     straight = bending(np.array([[1e-9 * sign]]), rate=10.0)
     still = PiecewisePolynomial(straight.breaks, straight.coefficients * [[[1e-9]], [[1.0]], [[1.0]]])
     assert curvature_jumps(still, both[:1]).size == 0
+
+
+@pytest.mark.parametrize("last", [True, False])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_larger_end_of_a_piece_counts(sign, last):
+    """s''' goes from 6 to 1, or from 1 to 6."""
+    slope = (-5.0 if last else 5.0) / 24.0
+    columns = sign * np.array([[slope], [1.0 if last else 1 / 6], [0.0], [1.0], [0.0]])
+    np.testing.assert_allclose(LawJerkConstraint(4.0).excess(LawPieces(np.ones(1), columns)), [1.5])
+
+
+@pytest.mark.parametrize("wrong", [[[-1.0, 1.0], [0.0, 1.0]], [[-1.0, 0.0], [-1.0, 1.0]]])
+def test_bounds_of_every_joint_are_looked_at(wrong):
+    with pytest.raises(ValueError, match="jerk bounds must be"):
+        JointJerkConstraint(path_of(0, joints=2), np.array(wrong))
+
+
+def test_a_jump_is_one_of_a_joint_by_its_own_curvature():
+    """One that bends a ten thousandth as much as the other has a jump of a ten thousandth of its own."""
+    both = np.tile([-5.0, 5.0], (2, 1))
+    path = bending(np.array([[0.0, 1e-4]]))
+    small = PiecewisePolynomial(path.breaks, path.coefficients * np.array([1.0, 1e-4]))
+    np.testing.assert_array_equal(curvature_jumps(small, both), [1.0])
+
+
+@pytest.mark.parametrize("at_end", [True, False])
+def test_the_largest_curvature_may_stand_at_either_end_of_a_piece(at_end):
+    """q'' is 1, at one outer end 1000: a jump of 1e-4 is rounding of that."""
+    slow, fast = [0.0, 0.5], [999.0 / 6, 0.5] if at_end else [-999.0 / 6, 500.0]
+    pair = [slow, fast] if at_end else [fast, slow]
+    rows = np.zeros((4, 2, 1))
+    rows[:2, :, 0] = np.array(pair).T
+    rows[1, 1] += 0.5e-4
+    assert curvature_jumps(PiecewisePolynomial(np.arange(3.0), rows), np.array([[-5.0, 5.0]])).size == 0
+    rows[1, 1] += 0.5e-2
+    assert curvature_jumps(PiecewisePolynomial(np.arange(3.0), rows), np.array([[-5.0, 5.0]])).size == 1
