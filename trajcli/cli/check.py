@@ -35,11 +35,13 @@ _JOINED = {
 }
 
 
-def _delivered(loaded: LoadedJob, profile: str | None) -> Plan:
-    """Return the plan of a job for a consumer."""
-    from trajcli.output.delivery.delivered import plan_of
+def _delivered(loaded: LoadedJob, profile: str | None, form: str) -> Plan:
+    """Return the plan of a job for a consumer, as it is written in a format."""
+    from trajcli.output.delivery.delivered import delivered
+    from trajcli.streams.formats import DEFAULT, FORMATS
 
-    return plan_of(loaded, profile)
+    named = {"fields": "npz"}.get(form, form)
+    return delivered(loaded, profile, next((FORMATS[name] for name in FORMATS if name == named), DEFAULT))[0]
 
 
 def run_check(options: CheckCommand) -> int:
@@ -120,6 +122,7 @@ def _lines(checked: CheckedFile) -> Iterator[str]:
     period = "" if judgement.period is None else f", every {judgement.period:.9g} s"
     source = judgement.source or "-"
     planned = ", rows of the motion that the job plans" if judgement.planned_rows else ""
+    planned += "" if judgement.planned_with is None else f" with `{judgement.planned_with}`"
     joined = _JOINED[judgement.interpolation]
     yield f"{source}: {judgement.verdict} ({rows}{period}, {joined}{planned})"
     listed = [*_listed(judgement.findings)]

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.plan import Plan
 
-Delivered = Callable[["LoadedJob", str | None], "Plan"]
-"""Returns the plan of a job for a consumer."""
+Delivered = Callable[["LoadedJob", str | None, str], "Plan"]
+"""Returns the plan of a job for a consumer, by its profile (None for its own), as a format has it."""
 _LARGEST_RATE = 1e9  # rows per second
 _START_TOLERANCE = 1e-3  # rad or m: what a controller takes for the state that it is in
 _STEP = 1e-6  # rad/s^2 or m/s^2: an acceleration that changes by more in the end steps there
@@ -103,7 +103,7 @@ def check_file(
         source: Its path; "-" is standard input. An opened one is read from its first byte on.
         options: What it is judged by.
         plan: Of a job that was planned before; the options then name no job and no robot.
-        delivered: Returns the plan of a job for a consumer, by the name of its profile, None for its own.
+        delivered: Returns the plan of a job for a consumer.
 
     Raises:
         InputError: When it is no motion, or options do not fit it or each other.
@@ -115,8 +115,9 @@ def check_file(
     if plan is None and options.job is None and options.robot is None:
         refuse_job(opened)
     given = _given(options) if plan is None else _of_plan(plan)
+    planned_with = None
     if plan is None and delivered is not None:
-        given = _as_delivered(opened, given, options, delivered)
+        given, planned_with = _as_delivered(opened, given, options, delivered)
     given = _carrying(given, options)
     robot = given.robot
     declared = None if plan is not None else stated_units(options.job or options.robot or "")
@@ -145,7 +146,7 @@ def check_file(
     if given.loaded is not None and "move" not in motion.quantities and by_time is None:
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
-    judged = _beside_plan(judged, compared, options)
+    judged = replace(_beside_plan(judged, compared, options), planned_with=planned_with)
     return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
 
 
@@ -163,19 +164,49 @@ def _rate_of(word: str | None) -> float | None:
     return rate
 
 
-def _as_delivered(source: ByteSource, given: _Given, options: CheckOptions, delivered: Delivered) -> _Given:
-    """Return the same with the plan for the consumer, where the rows are those of that one."""
+def _as_delivered(
+    source: ByteSource, given: _Given, options: CheckOptions, delivered: Delivered
+) -> tuple[_Given, str | None]:
+    """Return the same with the plan for the consumer whose rows these are, and the options that make it."""
     loaded = given.loaded
-    if given.plan is None or loaded is None or (options.profile or loaded.job.output.consumer) is None:
-        return given
+    if given.plan is None or loaded is None:
+        return given, None
+    if (options.profile or loaded.job.output.consumer) is not None:
+        found = _made_for(source, given, options, delivered, (options.profile, loaded))
+        return found or given, None
+    compared = _compared(source, given, options)
+    if compared is None or compared.planned:
+        return given, None
+    from trajcli.judge.rows.rows_for_consumers import consumers_of
+
+    for made in consumers_of(source, given.plan, options.topic, options.field):
+        found = _made_for(source, given, options, delivered, (made.profile, made.loaded))
+        if found is not None and found.plan is not None:
+            return found, made.options(given.plan, found.plan)
+    return given, None
+
+
+def _made_for(
+    source: ByteSource,
+    given: _Given,
+    options: CheckOptions,
+    delivered: Delivered,
+    consumer: tuple[str | None, LoadedJob],
+) -> _Given | None:
+    """Return what a job asks for a consumer, where the rows are those of that plan.
+
+    Without one, what the job plans by itself is judged by its rules.
+    """
+    profile, loaded = consumer
+    rows = open_rows_of(source, topic=options.topic, field=options.field, joints=len(given.robot.joints))
     try:
         with np.errstate(all="ignore"):
-            other = delivered(loaded, options.profile)
+            other = delivered(loaded, profile, rows.format)
     except TrajcliError:
-        return given  # what the job plans by itself is judged by its rules
+        return None
     found = _of_plan(other)
     compared = _compared(source, found, options)
-    return found if compared is not None and compared.planned else given
+    return found if compared is not None and compared.planned else None
 
 
 def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: Units | None) -> MotionFile:

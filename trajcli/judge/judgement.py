@@ -31,6 +31,8 @@ class Judgement:
         notes: What a reader should know: stamps that were snapped, what could not be judged.
         events: What was taken for granted, which `--strict` does not accept.
         planned_rows: Whether they are rows of the verified motion of the job; None without a plan.
+        planned_with: The options of `trajcli plan` that make them, where the job alone plans another motion;
+            such as "--for ros-jtc".
     """
 
     findings: tuple[Finding, ...]
@@ -41,6 +43,7 @@ class Judgement:
     notes: tuple[str, ...] = ()
     events: tuple[str, ...] = ()
     planned_rows: bool | None = None
+    planned_with: str | None = None
 
     @property
     def verdict(self) -> VerdictText:
@@ -77,7 +80,8 @@ class Judgement:
         ]
         plain = {"verdict": self.verdict, "findings": findings, "interpolation": self.interpolation}
         period = {} if self.period is None else {"period": self.period}
-        planned = {} if self.planned_rows is None else {"planned_rows": self.planned_rows}
+        planned: dict[str, Any] = {} if self.planned_rows is None else {"planned_rows": self.planned_rows}
+        planned |= {} if self.planned_with is None else {"planned_with": self.planned_with}
         said = {"notes": list(self.notes), "events": list(self.events)}
         return {**plain, "rows": self.rows, **period, **planned, **said}
 

@@ -71,11 +71,13 @@ class StretchedMoves:
         stated = _STATED[self._interpolation]
         in_periods = curve.breaks * self._rate
         inside = np.unique(np.floor(in_periods[np.abs(in_periods - np.rint(in_periods)) > _ON_ROW]))
-        inside = inside[(inside + 1) * period <= curve.end]
+        inside = inside[inside + 1 <= curve.end * self._rate + _ON_ROW]
         if not inside.size:
             return False
         before = curve.evaluate_orders(inside * period, range(stated))
-        after = curve.evaluate_orders((inside + 1) * period, range(stated), side="left")
+        after = curve.evaluate_orders(
+            np.minimum((inside + 1) * period, curve.end), range(stated), side="left"
+        )
         both = np.stack([before, after], axis=1).reshape(2 * inside.size, stated, -1)
         lengths = np.full(2 * inside.size - 1, period)
         columns = [both[:, order] if order < stated else None for order in range(3)]

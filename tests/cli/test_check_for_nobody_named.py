@@ -1,0 +1,100 @@
+"""Rows that `trajcli plan --for` wrote are recognised by `trajcli check --job` where nobody names the consumer."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running import call
+from tiers import few
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SLOW = ("--set", "when_over_limit=slow")
+
+
+def planned(capfd: pytest.CaptureFixture[str], job: str, file: Path, *options: str) -> None:
+    outcome = call(capfd, "plan", str(EXAMPLES / job), "-o", str(file), *SLOW, *options)
+    assert outcome.code == 0, outcome.err
+
+
+def checked(capfd: pytest.CaptureFixture[str], job: str, file: Path) -> tuple[int, dict[str, Any]]:
+    outcome = call(capfd, "check", str(file), "--job", str(EXAMPLES / job), "--json")
+    return outcome.code, json.loads(outcome.out)
+
+
+@pytest.mark.parametrize("ending", few(["csv", "mcap", "goal.yaml", "jsonl", "npy", "npz"], 2))
+def test_a_slower_motion_for_a_consumer_is_named_with_its_options(
+    ending: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / f"rows.{ending}"
+    planned(capfd, "sync.yaml", file, "--for", "ros-jtc")
+    code, found = checked(capfd, "sync.yaml", file)
+    assert (code, found["planned_rows"], found["verdict"]) == (0, True, "satisfied")
+    assert found["planned_with"] == "--for ros-jtc --set when_over_limit=slow"
+
+
+def test_the_options_that_are_named_make_the_same_rows(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file, again = tmp_path / "rows.csv", tmp_path / "again.csv"
+    planned(capfd, "sync.yaml", file, "--for", "ros-jtc", "--rate", "10")
+    words = checked(capfd, "sync.yaml", file)[1]["planned_with"].split()
+    assert words[:4] == ["--for", "ros-jtc", "--rate", "10"]
+    assert call(capfd, "plan", str(EXAMPLES / "sync.yaml"), "-o", str(again), *words).code == 0
+    assert again.read_bytes() == file.read_bytes()
+
+
+def test_the_table_says_it_in_its_first_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "rows.csv"
+    planned(capfd, "sync.yaml", file, "--for", "ros-jtc")
+    outcome = call(capfd, "check", str(file), "--job", str(EXAMPLES / "sync.yaml"))
+    first = outcome.out.splitlines()[0]
+    assert "rows of the motion that the job plans with `--for ros-jtc --set when_over_limit=slow`)" in first
+
+
+def _off(lines: list[str], row: int, column: int, by: float) -> list[str]:
+    cells = lines[row].split(",")
+    cells[column] = f"{float(cells[column]) + by:.9f}"
+    return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
+
+
+FAULTS = {
+    "a row is missing": lambda lines: [*lines[:4], *lines[5:]],
+    "a row is doubled": lambda lines: [*lines[:5], *lines[4:]],
+    "a row is later": lambda lines: _off(lines, 4, 0, 1e-6),
+    "a value is off": lambda lines: _off(lines, 4, 1, 1e-5),
+    "joints are swapped": lambda lines: [lines[0], *(_swapped(line) for line in lines[1:])],
+}
+
+
+def _swapped(line: str) -> str:
+    cells = line.split(",")
+    return ",".join([cells[0], cells[2], cells[1], *cells[3:]])
+
+
+@pytest.mark.parametrize("fault", few([*FAULTS], 2))
+def test_no_fault_is_taken_for_rows_of_a_consumer(
+    fault: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "rows.csv"
+    planned(capfd, "sync.yaml", file, "--for", "ros-jtc")
+    file.write_text("\n".join(FAULTS[fault](file.read_text().splitlines())) + "\n")
+    found = json.loads(
+        call(capfd, "check", str(file), "--job", str(EXAMPLES / "sync.yaml"), "--json").out or "{}"
+    )
+    assert found.get("planned_rows") is not True
+    assert "planned_with" not in found
+
+
+def test_rows_with_other_ends_are_planned_for_nobody(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from trajcli.cli import check
+
+    file = tmp_path / "rows.csv"
+    planned(capfd, "sync.yaml", file, "--for", "ros-jtc")
+    file.write_text("\n".join(file.read_text().splitlines()[:-1]) + "\n")
+    monkeypatch.setattr(check, "_delivered", lambda *_: pytest.fail("it is planned for a consumer"))
+    assert checked(capfd, "sync.yaml", file)[1]["planned_rows"] is False

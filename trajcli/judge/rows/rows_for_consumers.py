@@ -1,0 +1,158 @@
+"""Rows that may have been planned for a consumer that nobody names: those with the ends of the job's motion.
+
+A plan for a consumer goes through the same targets, so that a file of it has the first and last positions of
+the motion that the job plans by itself and lasts as long or longer. That tells whether it is
+worth planning for it; then every row is compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from trajcli.columns import parse_column
+from trajcli.consumers.judgement import load_profile
+from trajcli.consumers.profile import Profile, profile_names
+from trajcli.curves.piecewise import Array
+from trajcli.frozen import frozen
+from trajcli.job.read import LoadedJob
+from trajcli.judge.rows.planned_rows import halves_of
+from trajcli.planning.plan import Plan
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.reading import open_rows_of
+from trajcli.streams.row_sources import ColumnExtents
+
+_LONGEST = 2.0  # times the motion that the job plans by itself
+_SHORTER = 1e-6  # s: by how much stamps may make it shorter
+_OFF = 1e-9  # rad or m: what is the same position, beside its decimals
+_OF_PERIOD = 1e-6  # relative: stamps of one rate
+_REMEDIES = ("slowed", "other_rows", "for_consumer")  # events of a plan that is another one for its consumer
+
+
+@frozen
+class RowsForConsumer:
+    """A consumer for whose plan a file may hold the rows.
+
+    Attributes:
+        profile: Its name.
+        loaded: The job with the rows that the file has; it slows down where it must, as no other job gives
+            rows that are over a limit.
+        rate: Of the rows, where the job says another, 1/s.
+    """
+
+    profile: str
+    loaded: LoadedJob
+    rate: float | None = None
+
+    def options(self, alone: Plan, found: Plan) -> str:
+        """Return the options of `trajcli plan` that make these rows.
+
+        Args:
+            alone: The plan of the job for no consumer.
+            found: That for this one.
+        """
+        words = ["--for", self.profile]
+        if self.rate is not None:
+            words += ["--rate", f"{self.rate:.15g}"]
+        if alone.loaded.job.when_over_limit != "slow" and any(
+            event.kind in _REMEDIES for event in found.events
+        ):
+            words += ["--set", "when_over_limit=slow"]
+        return " ".join(words)
+
+
+@frozen
+class _Ends:
+    """What a file says at its ends: its positions and duration, its rate where it has one."""
+
+    first: Array
+    last: Array
+    slack: Array
+    duration: float
+    rate: float | None
+
+
+def consumers_of(
+    source: ByteSource, plan: Plan, topic: str | None = None, field: str | None = None
+) -> Iterator[RowsForConsumer]:
+    """Yield consumers for whose plan a file may hold the rows, and the job with the rows that it has.
+
+    Args:
+        source: The file.
+        plan: Of the job, for no consumer.
+        topic: Of MCAP, the one that is read.
+        field: Of messages with several states, the one that is read.
+    """
+    ends = _ends_of(source, plan, topic, field)
+    if ends is None or not _fits(ends, plan):
+        return
+    job, rate = plan.loaded.job.model_copy(update={"when_over_limit": "slow"}), ends.rate
+    for name in profile_names():
+        profile = load_profile(name)
+        if not _takes(profile, ends, len(plan.loaded.robot.joints)):
+            continue
+        yield RowsForConsumer(name, replace(plan.loaded, job=job))
+        if profile.rows.rate is None and rate is not None and rate != job.output.rate:
+            output = job.output.model_copy(update={"rate": rate, "times": None})
+            faster = job.model_copy(update={"output": output})
+            yield RowsForConsumer(name, replace(plan.loaded, job=faster), rate)
+
+
+def _fits(ends: _Ends, plan: Plan) -> bool:
+    """Return whether a file begins and ends where the motion does, and lasts about as long."""
+    curve, duration = plan.trajectory.curve, plan.trajectory.duration
+    begun = curve.evaluate(curve.start, 0)
+    ended = curve.evaluate(curve.end, 0, side="left")
+    if ends.first.size != begun.size or not duration - _SHORTER <= ends.duration <= _LONGEST * duration:
+        return False
+    off = np.maximum(np.abs(ends.first - begun), np.abs(ends.last - ended))
+    return bool((off <= ends.slack + _OFF).all())
+
+
+def _takes(profile: Profile, ends: _Ends, joints: int) -> bool:
+    """Return whether a consumer takes rows as those of a file are."""
+    counts = [rule.parameters for rule in profile.rules if rule.check == "joint_count"]
+    if any(count.get("count", joints) != joints for count in counts):
+        return False
+    rate = profile.rows.rate
+    return rate is None or (ends.rate is not None and abs(ends.rate / rate - 1) <= _OF_PERIOD)
+
+
+def _ends_of(source: ByteSource, plan: Plan, topic: str | None, field: str | None) -> _Ends | None:
+    """Return what a file says at its ends; None where it holds no positions of joints with their times."""
+    rows = open_rows_of(source, topic=topic, field=field, joints=len(plan.loaded.robot.joints))
+    columns = tuple(map(parse_column, rows.named.names))
+    times = [k for k, column in enumerate(columns) if column.kind == "t"]
+    positions = [k for k, column in enumerate(columns) if column.kind == "q"]
+    if not times or not positions:
+        return None
+    positions.sort(key=lambda k: columns[k].joint or 0)
+    factors = np.array([column.factor for column in columns])
+    first, last, stamps, extents = None, None, list[Array](), ColumnExtents(len(columns))
+    for block in rows.blocks(range(len(columns)), ()):
+        if len(block):
+            extents.add(block)
+            first = block[0] if first is None else first
+            last = block[-1]
+            stamps.append(block[:, times[0]] * factors[times[0]])
+    if first is None or last is None:
+        return None
+    t = np.concatenate(stamps)
+    slack = (halves_of(rows, columns, extents.still) * factors)[positions]
+    ends = [(row * factors)[positions] for row in (first, last)]
+    return _Ends(ends[0], ends[1], slack, float(t[-1] - t[0]), _rate_of(t))
+
+
+def _rate_of(t: Array) -> float | None:
+    """Return the rate of stamps, 1/s, the last of which may be at any time; None where they have none."""
+    steps = np.diff(t)
+    if steps.size < 2:
+        return None
+    whole = steps[:-1]
+    period = float(whole.mean())
+    if np.ptp(whole) > 2 * _SHORTER:
+        return None
+    rate = 1.0 / period
+    return float(round(rate)) if abs(rate - round(rate)) <= _OF_PERIOD * max(rate, 1.0) else rate
