@@ -259,6 +259,17 @@ def test_limits_files_may_be_in_degrees(capfd: pytest.CaptureFixture[str], tmp_p
     assert findings[0]["limit"] == pytest.approx(5.0001)
 
 
+def test_limits_that_are_looser_than_the_robots_are_said_with_their_units(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """3.14159265 rad/s are the 180 deg/s of the robot's description."""
+    words = ("check", GOAL, "--robot", "ur5e", "--limits")
+    said = "the given velocity limit of elbow_joint is looser than the robot's: {} instead of {}"
+    assert said.format("10 rad/s", "3.14159265 rad/s") in call(capfd, *words, "{velocity: 10}").err
+    in_degrees = call(capfd, *words, "{velocity: 500}", "--units", "deg")
+    assert said.format("500 deg/s", "180 deg/s") in in_degrees.err
+
+
 def test_limits_files_may_be_of_moveit(capfd: pytest.CaptureFixture[str]) -> None:
     folder = EXAMPLES / "moveit"
     file = next(iter(sorted(folder.glob("*limits*.yaml"))))

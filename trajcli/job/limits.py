@@ -46,10 +46,12 @@ class LooserBound(NamedTuple):
     amounts: dict[str, Amount | str]
 
 
-def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[Event]]:
+def with_job_limits(
+    robot: Robot, spec: LimitsSpec | None, whose: str = "the job's"
+) -> tuple[Robot, list[Event]]:
     """Return the robot with the job's limits in force, and an event for each looser than the robot's.
 
-    The robot's own efforts are in force where its `Limits.effort` holds them.
+    The robot's own efforts are in force where its `Limits.effort` holds them. Events begin with `whose`.
     """
     if spec is None:
         return robot, []
@@ -63,7 +65,7 @@ def with_job_limits(robot: Robot, spec: LimitsSpec | None) -> tuple[Robot, list[
     events = []
     looser = [*looser_bounds(robot, spec), *_looser_than_stated(robot, spec)]
     for quantity, joint, amounts in filterfalse(_is_not_judged, looser):
-        message = f"the job's {quantity} limit of {{joint}} is looser than the robot's: "
+        message = f"{whose} {quantity} limit of {{joint}} is looser than the robot's: "
         amounts |= {"joint": robot.joint_names[joint]}
         events.append(Event("looser_limit", message + "{after} instead of {before}", amounts=amounts))
     return _with_limits(robot, spec), events

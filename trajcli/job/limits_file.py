@@ -70,7 +70,7 @@ def _applied(robot: Robot, document: Document, units: Units) -> tuple[Robot, tup
     if file is not None:
         of_file = read_moveit_limits(file, document, robot)
         spec, noted = of_file.under(spec or JobLimitsSpec()), of_file.events
-    effective, events = with_job_limits(robot, spec)
+    effective, events = with_job_limits(robot, spec, "the given")
     return effective, (*noted, *events)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,7 @@ from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of, refuse_job
 from trajcli.streams.recorded.column_roles import note_of_unread
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
-from trajcli.units import Quantity, Units, joint_quantity
+from trajcli.units import Quantity, Units, amount_text, joint_quantity
 
 if TYPE_CHECKING:
     from trajcli.job.read import LoadedJob
@@ -348,7 +349,9 @@ def _given(options: CheckOptions) -> _Given:
 
     units = parse_units(options.units or "")  # as in a job: rad and m, unless somebody says others
     robot, events = with_limits_file(sheet.robot, options.limits, units)
-    return _Given(robot, sheet.units, tuple(event.text() for event in events if event.concedes), shown=units)
+    say = partial(amount_text, joint_types=robot.joint_types, units=units)
+    conceded = tuple(event.text(say) for event in events if event.concedes)
+    return _Given(robot, sheet.units, conceded, shown=units)
 
 
 def _of_job(path: str) -> _Given:
