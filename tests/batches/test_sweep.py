@@ -178,6 +178,28 @@ def test_what_binds_and_the_bound_have_closed_forms(job: str) -> None:
     assert (hold.point.bound, free.point.bound) == (2, None)
 
 
+CORNER = """\
+version: 1
+units: {angle: deg}
+robot: {joints: 2}
+limits: {velocity: 90, acceleration: 360, jerk: 36000}
+start: {joints: [0, 0]}
+zone: {joints: 5}
+moves:
+  - {planner: jerk_limited, to: {joints: [30, 0]}}
+  - {planner: jerk_limited, to: {joints: [30, 30]}}
+"""
+
+
+def test_what_a_search_through_zones_finds_is_no_bound(job: str) -> None:
+    """With stops it is the sum of both: d / v + v / a + a / j each. Through the zone it is faster than that."""
+    Path(job).write_text(CORNER, "utf-8")
+    flown, stopped = (row.point for row in table_of(swept(job, "moves.0.zone={joints: 5},stop")).rows)
+    assert stopped.bound == pytest.approx(2 * (30 / 90 + 90 / 360 + 360 / 36000), rel=1e-9)
+    assert flown.duration < stopped.bound
+    assert flown.bound is None
+
+
 def test_neither_order_nor_number_of_processes_shows(job: str) -> None:
     sweep = swept(job, *VARIED)
     texts = {table_of(sweep).text("csv")}

@@ -157,9 +157,12 @@ def _planned(document: Document) -> SweepPoint:
 
 
 def _bound(plan: Plan) -> float | None:
-    """Return a duration that no motion from stop to stop of the job is below; None where none is known."""
+    """Return a duration that no motion of the job is below; None where none is known.
+
+    Through zones the search knows one that proves nothing, and a proof takes seconds for each point.
+    """
     if plan.flyby is not None and plan.flyby.zones:
-        return plan.flyby.bound
+        return None
     bounds = [_bound_of_move(move) for move in plan.moves if move.duration > 0]
     return None if None in bounds else math.fsum(bound for bound in bounds if bound is not None)
 
