@@ -128,13 +128,17 @@ def test_of_all_moves_together_the_worst_of_each_certainty_is_kept(seed: int) ->
     assert {(f.row, f.count, f.move, f.severity, f.certainty) for f in found.findings()} == expected
 
 
-@pytest.mark.parametrize(("offset", "part"), [(0, slice(0, 6)), (3, slice(3, 6))])
-def test_all_moves_of_one_block_have_one_worst(offset: int, part: slice) -> None:
-    moves, excess = np.array([0, 0, 0, 1, 1, 1])[part], np.array([1.0, 5.0, 2.0, 4.0, 3.0, 4.5])[part]
+@pytest.mark.parametrize(
+    ("sizes", "worst"),
+    [([1, 5, 2, 4, 3, 4.5], (1, 3, 0)), ([1, 2, 1, 4, 3, 5], (5, 3, 1)), ([5, 2, 1, 4, 3, 5], (0, 3, 0))],
+)
+def test_all_moves_of_one_block_have_one_worst(sizes: list[float], worst: tuple[int, int, int]) -> None:
+    """Three offences of each of two moves: the first of the worst ones is kept, and those of its move count."""
     found = Collector(by_move=False)
-    found.add("velocity", moves, np.zeros(len(moves), dtype=int), excess, lambda row: finding(offset + row))
-    (worst,) = found.findings()
-    assert (worst.row, worst.count, worst.move) == ((1, 3, 0) if offset == 0 else (5, 3, 1))
+    moves, joints = np.array([0, 0, 0, 1, 1, 1]), np.zeros(6, dtype=int)
+    found.add("velocity", moves, joints, np.array(sizes, dtype=float), finding)
+    (one,) = found.findings()
+    assert (one.row, one.count, one.move) == worst
 
 
 @pytest.mark.parametrize(

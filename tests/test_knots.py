@@ -12,7 +12,7 @@ from tiers import few
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text, load_job
-from trajcli.knots import LARGEST_DEVIATION, Knots, knots_of
+from trajcli.knots import LARGEST_DEVIATION, Knots, knot_grid, knots_at, knots_of
 from trajcli.output.report import report_of
 from trajcli.planning.plan import plan_job
 from trajcli.trajectory import Span, State, Trajectory, resting
@@ -128,6 +128,77 @@ def made_of(curve: PiecewisePolynomial, end: State) -> Trajectory:
     span = Span(0, "quintic", 0.0, curve.end, 1)
     start = resting(np.zeros(n))
     return Trajectory(curve, names, ("revolute",) * n, (span,), start, end)
+
+
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("times", [(0.0, 0.8, 0.9, 1.0), (0.0, 0.1, 0.9, 1.0), (0.0, 0.1, 0.2, 1.0)])
+def test_the_deviation_is_that_of_the_worst_interval_and_joint(times, sign: int, joint: int) -> None:
+    """Of t^6 a quintic with the states of both ends of a length h misses (h/2)^6 at most, in the middle (Hermite).
+
+    Its error is t^3 (h - t)^3, of which the derivatives reach 96 / sqrt(5)^5 (h/2)^5 and, in the middle, 6 (h/2)^4.
+    """
+    coefficients = np.zeros((7, 1, 3))
+    coefficients[0, 0] = 0.1
+    coefficients[0, 0, joint] = sign * 2.0
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), coefficients)
+    end = State(*(curve.evaluate(1.0, order) for order in range(3)))
+    found = knots_at(made_of(curve, end), np.array(times)).deviation
+    half = np.diff(times).max() / 2
+    assert found.position == pytest.approx(2 * half**6, rel=1e-6)
+    assert found.velocity == pytest.approx(2 * 96 / 5**2.5 * half**5, rel=1e-6)
+    assert found.acceleration == pytest.approx(2 * 6 * half**4, rel=1e-6)
+    assert found.joints == (joint,) * 3
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_deviation_is_found_where_nobody_looks_first(sign: int) -> None:
+    """Of t^7 a quintic misses t^3 (t - 1)^3 (t + 3): each derivative is largest at a root of the next one."""
+    coefficients = np.zeros((8, 1, 1))
+    coefficients[0] = sign
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), coefficients)
+    end = State(*(curve.evaluate(1.0, order) for order in range(3)))
+    found = knots_at(made_of(curve, end), np.array([0.0, 1.0])).deviation
+    missed = np.poly1d([1, 0, 0, 0]) * np.poly1d([1, -1]) ** 3 * np.poly1d([1, 3])
+    for order, value in enumerate((found.position, found.velocity, found.acceleration)):
+        of_order = missed.deriv(order) if order else missed
+        at = [root.real for root in of_order.deriv().roots if abs(root.imag) < 1e-3 and 0 <= root.real <= 1]
+        assert value == pytest.approx(max(abs(of_order(t)) for t in [*at, 0.0, 1.0]), rel=1e-6)
+
+
+def test_around_a_step_of_the_acceleration_quintics_stay_within_both_sides() -> None:
+    """From 4 to 0 and from 0 to -4 rad/s^2, 1 rad/s between: no 21st part beyond them, and 20 nm beside the curve."""
+    move = {"planner": "trapezoid", "to": {"joints": [1, 0.1, -0.2]}, "velocity": 1.0, "acceleration": 4.0}
+    trajectory = trajectory_of_job(move, velocity=9, acceleration=90)
+    knots = knots_of(trajectory)
+    t = np.concatenate([time + np.linspace(-1e-3, 1e-3, 20_001) for time in (0.25, 1.0)])
+    position, _, acceleration = played(knots, t)
+    assert -4 * (1 + 1e-3) <= acceleration.min() <= -4 * (1 - 1e-3)
+    assert 4 * (1 - 1e-3) <= acceleration.max() <= 4 * (1 + 1e-3)
+    cruising = (t > 0.25 + 3e-4) & (t < 1.0 - 3e-4)
+    assert np.abs(acceleration[cruising]).max() <= 4e-3
+    assert np.abs(position - trajectory(t)).max() <= knots.deviation.position * (1 + 1e-6) <= 2.1e-8
+
+
+@pytest.mark.parametrize("rate", [100.0, 999.9, 1000 / 7])
+def test_rows_at_a_rate_and_at_knots_are_a_microsecond_apart(rate: float) -> None:
+    """Each time of the rate has a row, or a knot within a microsecond; each knot has its row."""
+    trajectory = trajectory_of("trapezoid")
+    knots = knots_of(trajectory)
+    rows = np.concatenate([local for _, local in knot_grid(trajectory, knots, rate).blocks()])
+    assert np.diff(rows).min() >= 1e-6 * (1 - 1e-6)
+    wanted = np.arange(int(trajectory.duration * rate) + 1) / rate
+    assert np.abs(wanted[:, None] - rows).min(axis=1).max() <= 1e-6
+    assert np.abs(knots.times[:, None] - rows).min(axis=1).max() == 0.0
+
+
+def test_the_deviation_of_many_knots_is_that_of_the_last_interval() -> None:
+    coefficients = np.zeros((7, 1, 1))
+    coefficients[0] = 1.0
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), coefficients)
+    end = State(*(curve.evaluate(1.0, order) for order in range(3)))
+    times = np.append(np.linspace(0.0, 0.8, 17_000), 1.0)
+    assert knots_at(made_of(curve, end), times).deviation.position == pytest.approx(0.1**6, rel=1e-6)
 
 
 def test_a_trajectory_of_no_length_is_one_knot() -> None:

@@ -148,3 +148,16 @@ def test_an_acceleration_that_steps_in_the_end_is_promised_by_no_joint_but_those
     findings = judged(tmp_path, job, rows, NAMES).findings
     found = [each.joint for each in findings if (each.kind, each.quantity) == ("end", "acceleration")]
     assert found == (["j2"] if wrong == 1 and end == 0.5 else [])
+
+
+@pytest.mark.parametrize("missing", [None, 1, 57, 98])
+def test_a_row_that_is_missing_is_told_though_all_others_are_those_of_the_plan(
+    missing: int | None, tmp_path: Path
+) -> None:
+    job = ONE_MOVE.replace("PLANNER", "quintic").replace("END", "0.5").replace("ACCELERATION", "90")
+    rows = rows_of(quintic, 0.5)
+    rows = rows if missing is None else np.delete(rows, missing, axis=0)
+    judgement = judged(tmp_path, job, rows, NAMES)
+    assert judgement.planned_rows is (missing is None)
+    found = [(each.row, each.severity) for each in judgement.findings if each.kind == "time"]
+    assert found == ([] if missing is None else [(missing + 1, "warning")])

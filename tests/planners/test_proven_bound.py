@@ -200,6 +200,8 @@ def test_a_law_along_a_line_has_the_limits_of_the_direction_of_each_joint(target
             )
             wanted = [max(low) if order else 0.0, min(high)]
             np.testing.assert_allclose(variable.bounds[order], wanted, rtol=1e-12)
+    for joint, variable in enumerate(variables[1:-1]):  # in the zone each joint has its own limits
+        np.testing.assert_array_equal(variable.bounds, [UNEQUAL[kind][joint] for kind in UNEQUAL])
 
 
 def test_collinear_moves_are_bounded_by_one_move_of_the_whole_way(few_programmes: None) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.judge.rows.tool_rows import joints_found_back
 from trajcli.output.write import write_plan
@@ -107,3 +108,30 @@ def test_velocities_of_the_tool_are_integrated(
     curve, times = plan.trajectory.curve, np.minimum(t, plan.trajectory.duration)
     for order, (values, near) in enumerate(zip(states, exact, strict=True)):
         np.testing.assert_allclose(values, curve.evaluate(times, order), rtol=0, atol=near)
+
+
+IN_THE_PLANE = """
+version: 1
+robot: planar2r
+limits: {velocity: 3, acceleration: 8, jerk: 60}
+start: {joints: [0.3, 1.2]}
+moves: [{planner: quintic, to: {joints: [0.9, 0.8]}}]
+"""
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_pose_that_the_arm_misses_by_more_than_rounding_is_refused(sign: int, tmp_path: Path) -> None:
+    """No joint of an arm in the plane raises the tool: a tenth of a micrometre is let go, ten are not."""
+    plan, file = planned(IN_THE_PLANE, "[t, pose]"), tmp_path / "rows.csv"
+    write_plan(plan, str(file), "full")
+    head, *lines = file.read_text().splitlines()
+    for off, refused in ((1e-7, False), (1e-5, True)):
+        cells = lines[3].split(",")
+        cells[head.split(",").index("z")] = repr(sign * off)
+        file.write_text("\n".join([head, *lines[:3], ",".join(cells), *lines[4:]]) + "\n")
+        source = ByteSource(str(file))
+        if refused:
+            with pytest.raises(PlanningError, match="cannot reach the pose"):
+                joints_found_back(source, plan.loaded.robot_of_rows, plan)
+        else:
+            assert joints_found_back(source, plan.loaded.robot_of_rows, plan) is not None
