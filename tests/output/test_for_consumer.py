@@ -15,6 +15,7 @@ from tiers import few
 
 import trajcli
 from trajcli.curves.operations import scale_time
+from trajcli.errors import VerificationError
 from trajcli.grids import UniformGrid
 from trajcli.job.read import load_job
 from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
@@ -172,3 +173,50 @@ def _fastest(distance: float, velocity: float, acceleration: float, jerk: float,
     answer = ruckig.Trajectory(1)
     ruckig.Ruckig(1).calculate(wanted, answer)
     return float(answer.duration)
+
+
+def _attempts(monkeypatch: pytest.MonkeyPatch, name: str, profile: str) -> tuple[str, int]:
+    """Return what is said of a job that does not keep its limits, and how many motions were planned for that."""
+    from trajcli.output.delivery import for_consumer
+
+    planned: list[None] = []
+
+    def counted(*given: Any, **named: Any) -> Any:
+        planned.append(None)
+        return plan_job(*given, **named)
+
+    monkeypatch.setattr(for_consumer, "plan_job", counted)
+    loaded = load_job(str(EXAMPLES / f"{name}.yaml"))
+    with np.errstate(all="ignore"), pytest.raises(VerificationError) as refused:
+        plan_for(*job_for(loaded, profile, {}), Writing())
+    return refused.value.problems[0].hint or "", len(planned)
+
+
+@pytest.mark.full
+def test_stretches_that_leave_a_step_at_the_end_of_a_move_are_not_planned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A time-optimal move ends with its acceleration, and the row there states none: no stretch below 1.37 helps."""
+    hint, planned = _attempts(monkeypatch, "fr3_near_limits", "franka-fr3")
+    assert hint == "`--set when_over_limit=slow` keeps all limits, with 6.026 s"
+    assert planned <= 20  # of 230 periods between
+
+
+@pytest.mark.full
+def test_chains_through_zones_are_searched_once_for_all_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At its knots a stretch by the cube root of what the jerk passes is enough, as scipy's curves say."""
+    from trajcli.planning import flown_job
+
+    searched: list[None] = []
+    search = flown_job.flown
+
+    def counted(*given: Any) -> Any:
+        searched.append(None)
+        return search(*given)
+
+    monkeypatch.setattr(flown_job, "flown", counted)
+    hint, _ = _attempts(monkeypatch, "flying_cell", "ros-jtc")
+    assert re.fullmatch(r"`--set when_over_limit=slow` keeps all limits, with 3\.46\d* s", hint), hint
+    assert len(searched) == 3
+    made = made_for("flying_cell", "ros-jtc")
+    assert largest_share(made.plan, made.grid, 1e-4) <= 1 + 10 * WITHIN

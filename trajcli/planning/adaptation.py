@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import KIND_OF
+from trajcli.planners.flying_by import FlownChain
 from trajcli.planners.planner import Planned, PlannedMove
 from trajcli.planning.retime import with_duration
 from trajcli.trajectory import State
@@ -28,12 +29,14 @@ class Adaptation:
         stretches: How many times longer a move lasts behind that, by its index.
         period: Of rows on which the breaks of their curves shall fall, s; None for any.
         known: Moves that were planned already, with all that they depend on.
+        chains: Chains that fly by corners, likewise, before they are stretched.
     """
 
     caps: Mapping[Cap, float] = field(default_factory=dict)
     stretches: Mapping[int, float] = field(default_factory=dict)
     period: float | None = None
     known: dict[Any, PlannedMove] = field(default_factory=dict)
+    chains: dict[Any, FlownChain] = field(default_factory=dict)
 
     def tightens(self, move: int) -> bool:
         """Return whether a limit of a move is tightened."""
@@ -47,6 +50,10 @@ class Adaptation:
     def whole_key(self, move: int, start: State, grid: tuple[float, bool]) -> Any:  # noqa: ANN401
         """Return all that a move depends on beside the job: also its rows, and how it is stretched."""
         return *self.key(move, start), grid, self.stretches.get(move, 1.0), self.period
+
+    def chain_key(self, moves: Sequence[PlannedMove]) -> Any:  # noqa: ANN401
+        """Return what the fastest motion by the corners of some moves depends on beside the job."""
+        return tuple(self.key(move.index, move.start) for move in moves)
 
     def stretched(self, move: PlannedMove) -> PlannedMove:
         """Return a move that lasts longer, where it shall."""

@@ -123,10 +123,9 @@ def _chain(
     events: list[Event],
 ) -> FlownChain | None:
     """Return the chain of some moves; None, with an event, where it is no faster than they are with stops."""
-    robots = [_adapted(move, moves, adapted) for move in moves]
     amounts: Amounts = {"stopping": Amount(stopping)}
     try:
-        chain = flown(moves, [corner.zone for corner in corners], robots)
+        chain = _fastest(moves, corners, adapted)
     except MissingLimitError as error:
         raise error.located(place=loaded.place_of_move(moves[0].index)) from None
     except PlanningError as error:
@@ -146,6 +145,19 @@ def _chain(
     message = "flying by its corners is no faster than stopping there, which takes {stopping}"
     events.append(Event("not_faster", message, moves[0].index, amounts))
     return None
+
+
+def _fastest(
+    moves: Sequence[PlannedMove], corners: Sequence[FlownCorner], adapted: Adaptation | None
+) -> FlownChain:
+    """Return the fastest chain that was found; the search for one does not depend on how it is stretched."""
+    robots, zones = [_adapted(move, moves, adapted) for move in moves], [corner.zone for corner in corners]
+    if adapted is None:
+        return flown(moves, zones, robots)
+    key = adapted.chain_key(moves)
+    if key not in adapted.chains:
+        adapted.chains[key] = flown(moves, zones, robots)
+    return adapted.chains[key]
 
 
 def _adapted(move: PlannedMove, chain: Sequence[PlannedMove], adapted: Adaptation | None) -> Robot:

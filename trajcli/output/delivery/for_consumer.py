@@ -29,7 +29,7 @@ from trajcli.output.consumer import judge_as_written
 from trajcli.output.delivery.joined import joined_rows, rows_that_keep, set_columns
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.write import grid_of
-from trajcli.planners.planner import Event, PlannedMove
+from trajcli.planners.planner import Event
 from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.plan import Carried, Plan, plan_job
 from trajcli.progress import report_progress
@@ -44,6 +44,8 @@ _SLACK = 1e-6  # relative: what a joined curve may be above a limit
 _COARSE = 0.05  # of a limit: what decimals alone may make up between knots
 _PERIODS = 200  # periods by which a motion is stretched as a whole, one after the other
 _FEW_PERIODS = 32  # likewise, where nothing else was found
+_FEW_THROUGH_ZONES = 16  # likewise, where corners are flown by
+_FEW_MOVES = 100
 _BY_RULE = 3.0  # times a limit of a rule: what passes it by more is a step, as of a start in motion
 _LONGER = 1e-9  # relative: a duration that differs by less is the same
 
@@ -215,7 +217,7 @@ def plan_for(
     """
     search = _Search(loaded, profile, writing, carried)
     said = (brought,) if brought else ()
-    first = search.attempt(loaded, rules=True)
+    first = search.first()
     if first.keeps or not first.plan.verdict.passed:
         return replace(first, said=said)
     from trajcli.output.delivery.tightening import may_be_cured
@@ -255,7 +257,16 @@ class _Search:
     ) -> None:
         self._loaded, self._profile, self._writing, self._carried = loaded, profile, writing, carried
         self._shortest: float | None = None
-        self._known: dict[Any, PlannedMove] = {}
+        self._begun = Adaptation()  # what it knows of moves, all that are adapted know
+
+    def first(self) -> ForConsumer:
+        """Return the plan as it is without its consumer; chains through zones are kept for what follows.
+
+        Of many moves those that repeat are planned once, which goes before that.
+        """
+        job = self._loaded.job
+        kept = self._begun if job.names_zones and len(job.moves) <= _FEW_MOVES else None
+        return self.attempt(self._loaded, kept, rules=True)
 
     def attempt(
         self, loaded: LoadedJob, adapted: Adaptation | None = None, *, rules: bool = False
@@ -303,9 +314,12 @@ class _Search:
     def slower(self, first: ForConsumer) -> ForConsumer:
         """Return the shortest motion that was found whose rows keep all; `first` where none was."""
         best: ForConsumer | None = None
-        for loaded, adapted in self._candidates(first):
-            with suppress(TrajcliError):
-                best = self._tightened(loaded, adapted, best) or best
+        # to search a motion through zones anew within each tighter limit takes seconds
+        for stretched in (True, False) if self._loaded.job.names_zones else (False,):
+            if stretched or best is None:
+                for loaded, adapted in self._candidates(first):
+                    with suppress(TrajcliError):
+                        best = self._tightened(loaded, adapted, best, stretched=stretched) or best
         best = self._stretched(first, best) or best
         if best is None:
             return first
@@ -317,7 +331,7 @@ class _Search:
 
     def _candidates(self, first: ForConsumer) -> Iterator[tuple[LoadedJob, Adaptation]]:
         """Yield jobs with rows that they may have, and how their moves are planned."""
-        yield self._loaded, Adaptation(known=self._known)
+        yield self._loaded, self._begun
         output, form = self._loaded.job.output, self._writing.form
         columns: list[dict[str, Any]] = [{}]
         jerk = any(np.isfinite(move.robot.limits.jerk).any() for move in first.plan.moves)
@@ -325,10 +339,13 @@ class _Search:
             columns.append({"columns": self._profile.rows.columns[:3]})
         if self._profile.rows.rate is None and has_knots(first.plan.trajectory):
             for change in columns:
-                yield self._with_output({"rows": "knots", "times": None, **change}), Adaptation()
+                yield self._with_output({"rows": "knots", "times": None, **change}), self._begun
         if isinstance(first.grid, UniformGrid) and form.content != "knots":
             for change in columns:
-                yield self._with_output({"align": True, **change}), Adaptation(period=1 / first.grid.rate)
+                yield (
+                    self._with_output({"align": True, **change}),
+                    replace(self._begun, period=1 / first.grid.rate),
+                )
 
     def _stretched(self, first: ForConsumer, best: ForConsumer | None) -> ForConsumer | None:
         """Return the motion stretched as a whole by the fewest periods that do, where that beats the best."""
@@ -337,10 +354,10 @@ class _Search:
         from trajcli.output.delivery.stretched_moves import StretchedMoves
 
         duration, rate = first.plan.trajectory.duration, first.grid.rate
-        by_move = StretchedMoves(first.rows, rate, self._known)
+        by_move = StretchedMoves(first.rows, rate, self._begun.known)
         longest = np.inf if best is None else best.plan.trajectory.duration
         most = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
-        for periods in range(1, most):
+        for periods in range(1, min(most, _FEW_THROUGH_ZONES) if self._loaded.job.names_zones else most):
             factor = 1 + periods / (rate * duration)
             if by_move.are_over(factor):
                 continue
@@ -348,7 +365,7 @@ class _Search:
             report_progress(f"planning for {self._profile.name}, {periods} periods longer")
             with suppress(TrajcliError):
                 made = self.attempt(
-                    self._with_output({"align": True}), Adaptation(stretches=stretches, known=self._known)
+                    self._with_output({"align": True}), replace(self._begun, stretches=stretches)
                 )
                 if made.plan.trajectory.duration >= longest:
                     return None
@@ -361,7 +378,7 @@ class _Search:
         return replace(self._loaded, job=self._loaded.job.model_copy(update={"output": output}))
 
     def _tightened(
-        self, loaded: LoadedJob, adapted: Adaptation, best: ForConsumer | None
+        self, loaded: LoadedJob, adapted: Adaptation, best: ForConsumer | None, *, stretched: bool = False
     ) -> ForConsumer | None:
         """Return a motion whose rows keep all, within tighter limits where that is needed.
 
@@ -369,6 +386,7 @@ class _Search:
             loaded: The job.
             adapted: How its moves are planned.
             best: The shortest that is known; one that lasts longer is of no use.
+            stretched: Whether moves are stretched only.
         """
         from trajcli.output.delivery.tightening import tightened
 
@@ -379,7 +397,7 @@ class _Search:
                 return None
             if made.clean or not made.plan.verdict.passed:
                 return made if made.clean else None
-            tighter = tightened(made.plan, made.over, made.uses_over, adapted)
+            tighter = tightened(made.plan, made.over, made.uses_over, adapted, stretched=stretched)
             if tighter is None:
                 return None
             adapted = tighter
@@ -404,6 +422,7 @@ class _Search:
             yield f"`{' '.join(options)}`{instead} keeps all limits, with {duration:.6g} s as now"
         job = self._loaded.job.model_copy(update={"when_over_limit": "slow"})
         slow = _Search(replace(self._loaded, job=job), self._profile, self._writing, self._carried)
+        slow._begun = Adaptation(chains=self._begun.chains)
         slower = slow.slower(first)
         if slower.keeps:
             duration = slower.plan.trajectory.duration

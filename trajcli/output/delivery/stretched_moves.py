@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from trajcli.curves.piecewise import derivative_coefficients, horner
+from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.errors import TrajcliError
 from trajcli.judge.reconstruction import piece_coefficients
 from trajcli.output.delivery.joined_rows import JoinedRows
@@ -46,38 +47,52 @@ class StretchedMoves:
             if fit and move is not None and move.at_rest and not move.robot.limits.has_effort
         ]
         self._rate, self._interpolation = rate, rows.interpolation or "linear"  # without one no move fits
-        self._over: dict[tuple[int, int], bool] = {}
+        self._followed = {move.index: other for move, other in pairwise(moves) if move is not None}
+        self._over: dict[tuple[int, int, int], bool] = {}
 
     def are_over(self, factor: float) -> bool:
         """Return whether a move is certainly over a limit of a joint when all of them are so much longer."""
         adapted = Adaptation(stretches={move.index: factor for move in self._moves})
-        for move in self._moves:
-            try:
-                longer = align_to_period(
+        try:
+            longer = {
+                move.index: align_to_period(
                     adapted.stretched(move) if move.over_limit == "slow" else move, self._rate
                 )
-            except TrajcliError:
-                return False
-            key = move.index, round(longer.duration * self._rate)
+                for move in self._moves
+            }
+        except TrajcliError:
+            return False
+        for index, move in longer.items():
+            other = self._followed.get(index)
+            behind = None if other is None else longer.get(other.index)
+            rows = [0 if each is None else round(each.duration * self._rate) for each in (move, behind)]
+            key = index, rows[0], rows[1]
             if key not in self._over:
-                self._over[key] = self._is_over(longer)
+                self._over[key] = self._is_over(move, behind)
             if self._over[key]:
                 return True
         return False
 
-    def _is_over(self, move: PlannedMove) -> bool:
-        """Return whether the curve that joins rows is over a limit where a break of the planned one lies."""
+    def _is_over(self, move: PlannedMove, behind: PlannedMove | None) -> bool:
+        """Return whether the curve that joins rows is over a limit where a break of the planned one lies.
+
+        The row at its end states the acceleration with which the move behind it begins.
+        """
         curve, period = move.planned.curve, 1.0 / self._rate
         stated = _STATED[self._interpolation]
         in_periods = curve.breaks * self._rate
         inside = np.unique(np.floor(in_periods[np.abs(in_periods - np.rint(in_periods)) > _ON_ROW]))
-        inside = inside[inside + 1 <= curve.end * self._rate + _ON_ROW]
+        last = round(curve.end * self._rate) - 1
+        begun = None if behind is None else self._begun(behind)
+        inside = inside[inside < last] if begun is None else np.union1d(inside[inside < last], [last])
         if not inside.size:
             return False
         before = curve.evaluate_orders(inside * period, range(stated))
         after = curve.evaluate_orders(
             np.minimum((inside + 1) * period, curve.end), range(stated), side="left"
         )
+        if begun is not None and stated > 2:
+            after[-1, 2] = begun
         both = np.stack([before, after], axis=1).reshape(2 * inside.size, stated, -1)
         lengths = np.full(2 * inside.size - 1, period)
         columns = [both[:, order] if order < stated else None for order in range(3)]
@@ -94,3 +109,8 @@ class StretchedMoves:
             if max(float(low.max()), float(high.max())) > 1 + _CERTAIN:
                 return True
         return False
+
+    def _begun(self, move: PlannedMove) -> Array | None:
+        """Return the acceleration with which a move begins; None where it changes before a row could tell."""
+        curve = move.planned.curve
+        return None if curve.lengths[0] * self._rate <= _ON_ROW else curve.evaluate(curve.start, 2)

@@ -32,7 +32,12 @@ def _curable(finding: Finding) -> bool:
 
 
 def tightened(
-    plan: Plan, over: Sequence[Finding], uses: Sequence[tuple[float, int, int, int]], adapted: Adaptation
+    plan: Plan,
+    over: Sequence[Finding],
+    uses: Sequence[tuple[float, int, int, int]],
+    adapted: Adaptation,
+    *,
+    stretched: bool = False,
 ) -> Adaptation | None:
     """Return how moves are planned so that rows do not pass what they pass now; None where nothing helps.
 
@@ -41,6 +46,7 @@ def tightened(
         over: What its rows pass as they are joined, and by the rules of their consumer.
         uses: Shares of limits of joints above 1, as `JoinedRows.uses` yields them.
         adapted: How its moves were planned.
+        stretched: Whether moves are stretched, whatever they pass.
     """
     caps, longer = dict(adapted.caps), dict[int, float]()
     moves = {move.index: number for number, move in enumerate(plan.moves)}
@@ -51,10 +57,10 @@ def tightened(
             move = plan.moves[number]
             if move.over_limit != "slow":
                 continue
-            if kind == "deviation":
+            if kind == "deviation" and not stretched:
                 _slow_down(caps, plan, number, max(excess**-0.5, _SLOWEST))
-            elif excess < _LITTLE and adapted.period is None and move.at_rest:
-                factor = excess ** (1 / (KIND_OF[kind].order or 1)) / _LESS
+            elif stretched or (excess < _LITTLE and adapted.period is None and move.at_rest):
+                factor = excess ** (1 / _order_of(kind)) / _LESS
                 longer[move.index] = max(longer.get(move.index, 1.0), factor)
             else:
                 _tighten(caps, plan, number, (kind, excess, joint))
@@ -74,6 +80,11 @@ def _passed(
     for finding in over:
         joint = -1 if finding.joint is None else names.index(finding.joint)
         yield finding.kind, finding.excess, joint, finding.move or 0
+
+
+def _order_of(kind: str) -> int:
+    """Return with which power of a stretch a quantity falls; rows leave the path of a tool by the square."""
+    return 2 if kind == "deviation" else KIND_OF[kind].order or 1
 
 
 def _movers(plan: Plan, number: int) -> Iterator[int]:
