@@ -284,3 +284,13 @@ def test_a_rounded_pose_is_projected_and_a_wrong_one_refused() -> None:
     for wrong in (np.eye(3), 2 * pose, pose * [-1, 1, 1, 1], np.full((4, 4), np.nan)):
         with pytest.raises(trajcli.InputError):
             robot.ik(wrong)
+
+
+def test_words_that_mean_nothing_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(trajcli.InputError, match="no frame 'flange'"):
+        trajcli.load_robot("ur5e").jacobian([0.0] * 6, "flange")  # type: ignore[arg-type]
+    with pytest.raises(trajcli.InputError, match="fixed or full digits, got 'all'"):
+        trajcli.plan(CUBIC).save(tmp_path / "rows.csv", digits="all")  # type: ignore[arg-type]
+    with pytest.raises(trajcli.InputError, match=r"moves\.0\.duration has no values"):
+        trajcli.sweep(EXAMPLES / "cubic.yaml", {"moves.0.duration": []})
+    assert not [*tmp_path.iterdir()]

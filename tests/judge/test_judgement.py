@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from trajcli.findings import Finding
-from trajcli.judge.judgement import Judgement, as_planned, worst_first
+from trajcli.judge.judgement import Judgement, as_joined, as_planned, worst_first
 
 
 def finding(value: float = 2.0, **fields: Any) -> Finding:
@@ -73,6 +73,14 @@ def test_rows_of_a_verified_motion_have_no_jumps_whatever_their_rate(rule: str) 
 
 def test_what_rounding_explains_of_a_verified_motion_is_nothing() -> None:
     assert planned(finding(rule="limit", certainty="within rounding")).findings == ()
+
+
+def test_what_rounding_explains_is_nothing_where_a_consumer_joins_them_either() -> None:
+    """What a limit is passed by between them is an error, as much as it is."""
+    explained, passed = finding(rule="limit", certainty="within rounding"), finding(rule="limit")
+    joined = as_joined(Judgement((explained, passed), "cubic", 2))
+    assert (joined.findings, joined.verdict) == ((passed,), "exceeded")
+    assert as_joined(Judgement((explained,), "cubic", 2)).verdict == "satisfied"
 
 
 def test_the_worst_of_what_is_passed_is_named() -> None:

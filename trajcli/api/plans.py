@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,11 +49,13 @@ class PlannedJob(Plan):
 
         Raises:
             VerificationError: When the plan breaks a limit; nothing is written.
-            InputError: When the ending is that of no format.
+            InputError: When the ending is that of no format, or digits are other words.
             FileError: When the file cannot be written.
         """
         from trajcli.output.write import write_plan
 
+        if digits not in (None, "fixed", "full"):
+            raise InputError(f"expected fixed or full digits, got {digits!r}")
         write_plan(self, str(path), digits or self.digits)
 
     def report(self) -> Report:
@@ -116,10 +118,12 @@ class Arm(Robot):
             frame: In whose axes: "world", "base" or "tcp".
 
         Raises:
-            InputError: When the robot has no geometry, or q has not n finite values.
+            InputError: When the robot has no geometry, q has not n finite values, or there is no such frame.
         """
-        from trajcli.kinematics.jacobian import jacobian
+        from trajcli.kinematics.jacobian import ReferenceFrame, jacobian
 
+        if frame not in get_args(ReferenceFrame):
+            raise InputError(f"there is no frame {frame!r}", hint="world, base or tcp")
         return jacobian(self, q, frame)
 
     def ik(

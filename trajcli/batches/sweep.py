@@ -83,7 +83,13 @@ def parse_axis(text: str) -> Axis:
 
 
 def axis_of(path: str, values: Sequence[Any]) -> Axis:
-    """Return the axis of a path and its values."""
+    """Return the axis of a path and its values.
+
+    Raises:
+        InputError: When there are none.
+    """
+    if len(values) == 0:
+        raise InputError(f"{path} has no values", hint='give a list such as [1, 2], or a text: "1..3:9"')
     return Axis(path, tuple(map(value_text, values)))
 
 

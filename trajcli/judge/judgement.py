@@ -138,6 +138,8 @@ def as_joined(judgement: Judgement) -> Judgement:
     findings = tuple(
         finding
         for finding in judgement.findings
-        if finding.rule not in _OF_LIMITS or not finding.limit or finding.excess > 1 + JOINED_RELATIVE
+        if finding.rule not in _OF_LIMITS
+        or not finding.limit
+        or (finding.certainty == "exceeded" and finding.excess > 1 + JOINED_RELATIVE)
     )
     return replace(judgement, findings=findings, planned_rows=True)
