@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from followed_paths import CASES
 
+from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line, Pivot
+from trajcli.geometry.rotation import exp
 from trajcli.kinematics.following.follower import follower
-from trajcli.kinematics.following.tolerance import Tolerance, ToleranceRatio, probes, tolerance_ratio
+from trajcli.kinematics.following.tolerance import (
+    Tolerance,
+    ToleranceRatio,
+    _by_kind,
+    probes,
+    tolerance_ratio,
+)
+from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.following.tracking import track_branch
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Joint, Robot, unlimited
 
 MADE = CASES["ur5e, pose on an arc"]
 ARM = follower(MADE.robot, MADE.path.at_s, MADE.start, 0.0)
@@ -65,3 +80,77 @@ def test_peaks_are_those_of_the_tool_and_of_any_joint():
     np.testing.assert_allclose(
         measure.joint_peaks, np.abs(known.values[1:]).max(axis=(1, 2))[:, None].repeat(6, 1), rtol=2e-2
     )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_two_parallel_joints_turn_the_tool_by_their_sum(order, sign):
+    """Of a UR5e the second and the third: with the same sign it turns by both, against each other by none of them."""
+    measure, off = ratio(position=1e3, angle=1e-9), sign * 1e-4
+    exact = np.abs(KNOWN.values[order, ROWS]).max(axis=1)
+    joint_peak = 1.0 if order == 0 else np.maximum(measure.joint_peaks[order - 1, 0], exact)
+    tool_peak = 1.0 if order == 0 else measure.tool_peaks[order - 1, 1]
+    racing = 0.0 if order == 0 else 1e-8 * exact
+    of_joint, of_tool = 1e-4 / (1e-9 * joint_peak), 2e-4 / (1e-9 * tool_peak + racing)
+    fitted = changed(order, off)
+    fitted[order, :, 2] += off
+    np.testing.assert_allclose(measure(KNOWN, ROWS, fitted), np.maximum(of_tool, of_joint), rtol=1e-4)
+    fitted[order, :, 2] -= 2 * off
+    np.testing.assert_allclose(measure(KNOWN, ROWS, fitted), of_joint, rtol=1e-6)
+    if order == 0:
+        assert np.all(of_tool > of_joint)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_where_joints_race_they_are_measured_by_themselves(order):
+    """At the rows they are thousands of times as fast as was seen between breaks."""
+    measure = ratio(position=1e3, angle=1e-9)
+    slow = replace(measure, joint_peaks=1e-3 * measure.joint_peaks, tool_peaks=1e9 * measure.tool_peaks)
+    fitted = changed(order, 1e-4)
+    exact = np.abs(KNOWN.values[order, ROWS]).max()
+    assert slow.joint_peaks[order - 1, 0] < exact
+    np.testing.assert_allclose(slow(KNOWN, ROWS, fitted), 1e-4 / (1e-9 * exact), rtol=1e-6)
+
+
+def test_joints_that_slide_are_measured_in_metres_by_those_that_slide():
+    rates = np.array([[1.0, -7.0, 0.2, 0.1], [-3.0, 2.0, 0.4, -0.6]])
+    turning = np.array([True, True, False, False])
+    assert _by_kind(rates, turning).tolist() == [7.0, 7.0, 0.6, 0.6]
+    assert _by_kind(rates, ~turning).tolist() == [7.0, 7.0, 0.6, 0.6]
+    kinds = ("revolute", "prismatic", "revolute")
+    joints = tuple(Joint(f"q{k}", kind) for k, kind in enumerate(kinds))
+    arm = SimpleNamespace(
+        robot=Robot("mixed", joints, unlimited(3), "standard", np.eye(4), np.eye(4)), length=1.0
+    )
+    measure = ToleranceRatio(arm, Tolerance(2e-6, 3e-5), np.ones((2, 3)), np.ones((2, 2)))  # type: ignore[arg-type]
+    assert measure._joint.tolist() == [3e-5, 2e-6, 3e-5]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_rate_of_turning_is_measured_beside_that_of_moving(order):
+    """Joints that may be off by anything, and a tool whose position may, too."""
+    measure = ratio(position=1e3, angle=1e-9)
+    free = replace(measure, joint_peaks=1e12 * measure.joint_peaks)
+    racing = 1e-8 * np.abs(KNOWN.values[order, ROWS]).max(axis=1)
+    wanted = 1e-4 / (1e-9 * measure.tool_peaks[order - 1, 1] + racing)
+    np.testing.assert_allclose(free(KNOWN, ROWS, changed(order, 1e-4)), wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("turning", [False, True])
+def test_what_the_tool_does_not_do_is_measured_by_what_it_does(turning):
+    """A line without a turn: of the turn a tenth of what moves a point of the arm's length so fast; and a turn alone."""
+    pose = forward(MADE.robot, MADE.start)
+    start, length = pose[:3, 3], ARM.length
+    if turning:
+        orientation = AxisAngleOrientation.between(
+            pose[:3, :3], exp(np.array([0.0, 0.0, 0.2])) @ pose[:3, :3]
+        )
+        path = ToolPath(PoseCurve(Pivot(start, start, orientation.length), orientation), (True,) * 3, "all")
+    else:
+        line = Line(start, start + np.array([0.0, 0.0, 0.1]))
+        path = ToolPath(PoseCurve(line, FixedOrientation(pose[:3, :3], line.length)), (True,) * 3, "all")
+    arm = follower(MADE.robot, path.at_s, MADE.start, 0.0)
+    coarse = track_branch(arm, path.breaks)
+    measure = tolerance_ratio(arm, Tolerance(), path.breaks, coarse.evaluate(probes(path.breaks)))
+    wanted = [0.1 * length, 1.0] if turning else [1.0, 0.1 / length]
+    np.testing.assert_allclose(measure.tool_peaks[0], wanted, rtol=1e-6)

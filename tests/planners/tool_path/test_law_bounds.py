@@ -1,0 +1,135 @@
+"""Bounds of laws along a path: what the tool then does, of which limits; peaks of shapes; several segments."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trajcli.curves.extrema import peaks
+from trajcli.errors import PlanningError
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.orientation import FixedOrientation
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.robot import ToolLimits
+from trajcli.planners.tool_path.derivatives import PathDerivatives
+from trajcli.planners.tool_path.law import LAWS, LawSpec, PathBounds, law_along, law_bounds
+
+TOOL = {"speed": 0.7, "acceleration": 2.0, "jerk": 30.0, "angular_speed": 1.5, "angular_acceleration": 4.0}
+PATHS = {
+    "straight": PathDerivatives(True, 0.0, 0.0, 0.0),
+    "bent": PathDerivatives(True, 8.0, 0.0, 0.0),
+    "stretched": PathDerivatives(True, 0.0, 0.0, 0.0, 1.6),
+    "stretched and bent": PathDerivatives(True, 5.0, 0.0, 0.0, 1.6),
+    "turning": PathDerivatives(True, 0.0, 9.0, 0.0),
+    "turning unevenly": PathDerivatives(True, 0.0, 3.0, 40.0),
+    "in place": PathDerivatives(False, 0.0, 1.0, 0.0),
+}
+
+
+def used_by(bounds: PathBounds, path: PathDerivatives) -> dict[str, float]:
+    """Return what the tool does at most with a law within bounds, along a path whose derivatives are the largest.
+
+    Of the position p' is along p'' only where p' is no unit vector; w' and w'' may have any directions.
+    """
+    v, a = bounds.speed, max(bounds.acceleration, bounds.deceleration)
+    along, across = path.stretch * a, path.curvature * v**2
+    square = path.stretch == 1.0
+    return {
+        "speed": path.stretch * v if path.moves else 0.0,
+        "acceleration": (math.hypot(along, across) if square else along + across) if path.moves else 0.0,
+        "angular_speed": path.turning * v,
+        "angular_acceleration": path.turning * a + path.turning_change * v**2,
+    }
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_tool_and_rotation_keep_their_limits_and_use_one_of_each_order(name: str) -> None:
+    bounds, ruled = law_bounds(LawSpec(shape="quintic"), ToolLimits(**TOOL), PATHS[name], "line")
+    used = {key: value / TOOL[key] for key, value in used_by(bounds, PATHS[name]).items()}
+    assert max(used.values()) <= 1 + 1e-12
+    assert max(used["acceleration"], used["angular_acceleration"]) >= 0.59
+    assert max(used.values()) >= 0.79
+    assert ruled == ("rotation" if "turning" in name or name == "in place" else "translation")
+    assert bounds.jerk == (TOOL["jerk"] if PATHS[name].moves else math.inf)
+    assert bounds.unit == ("length" if PATHS[name].moves else "angle")
+
+
+def test_what_a_law_names_is_along_the_path() -> None:
+    spec = LawSpec(shape="trapezoid", speed=0.3, acceleration=1.0, deceleration=0.5)
+    bounds, _ = law_bounds(spec, ToolLimits(**TOOL), PATHS["bent"], "line")
+    assert (bounds.speed, bounds.acceleration, bounds.deceleration) == (0.3, 1.0, 0.5)
+    assert bounds.by_order == (0.3, 0.5, TOOL["jerk"])
+    up = replace(bounds, acceleration=0.2)
+    assert up.by_order == (0.3, 0.2, TOOL["jerk"])
+    assert (
+        law_bounds(LawSpec(shape="quintic", jerk=9.0), ToolLimits(**TOOL), PATHS["bent"], "line")[0].jerk
+        == 9.0
+    )
+    twice = bounds.with_each(up, lambda one, other: one + other)
+    assert (twice.speed, twice.acceleration, twice.deceleration) == (0.6, 1.2, 1.0)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("length", [0.2, 1.7])
+@pytest.mark.parametrize("shape", ["cubic", "quintic", "cycloidal", "jerk_limited"])
+def test_the_fastest_of_a_shape_reaches_one_bound_and_passes_none(
+    shape: str, length: float, order: int
+) -> None:
+    """Found by the extremes of the law; the bounds of the other orders are loose."""
+    wide = [1e3, 1e4, 1e5]
+    wide[order - 1] = 1.3
+    bounds = PathBounds(wide[0], wide[1], wide[1], wide[2])
+    made = LAWS[shape].segment(LawSpec(shape=shape), length, bounds, None).law
+    reached = [float(each.magnitude[0]) for each in peaks(made, (0, 1, 2, 3))]
+    assert reached[0] == pytest.approx(length)
+    for found, bound in zip(reached[1:], wide, strict=True):
+        assert found <= bound * (1 + 2e-3)
+    assert reached[order] == pytest.approx(1.3, rel=2e-3)
+
+
+@pytest.mark.parametrize("shape", ["cubic", "quintic", "cycloidal"])
+def test_a_duration_below_the_shortest_is_refused(shape: str) -> None:
+    bounds = PathBounds(1.3, 5.0, 5.0, 90.0)
+    shortest = LAWS[shape].segment(LawSpec(shape=shape), 0.7, bounds, None).law.duration
+    LAWS[shape].segment(LawSpec(shape=shape), 0.7, bounds, shortest)
+    with pytest.raises(PlanningError, match="but the law says at most"):
+        LAWS[shape].segment(LawSpec(shape=shape), 0.7, bounds, shortest * (1 - 1e-6))
+
+
+def cornered() -> ToolPath:
+    """Return a path of 0.3 m, then 0.6 m square to it: a law stops between."""
+    corner = np.array([0.3, 0.0, 0.0])
+    lines = [Line(np.zeros(3), corner), Line(corner, corner + np.array([0.0, 0.6, 0.0]))]
+    chain = join(lines)
+    return ToolPath(PoseCurve(chain, FixedOrientation(np.eye(3), chain.length)), (True,) * 3, "all")
+
+
+@pytest.mark.parametrize("shape", ["trapezoid", "cubic", "quintic", "cycloidal"])
+@pytest.mark.parametrize("fields", [{}, {"duration": 3.0}, {"minimum_duration": 6.0}])
+def test_a_law_over_two_segments_stops_between_them(shape: str, fields: dict[str, float]) -> None:
+    """Durations are shared as lengths are; a law that is too short is slower as a whole, phases and breaks with it."""
+    path = cornered()
+    made, _ = law_along(path, LawSpec(shape=shape, **fields), ToolLimits(**TOOL), "polyline")
+    fastest = [
+        LAWS[shape].segment(LawSpec(shape=shape), length, PathBounds(0.7, 2.0, 2.0, 30.0), None).law.duration
+        for length in (0.3, 0.6)
+    ]
+    halt = {"duration": 1.0, "minimum_duration": 6.0 * fastest[0] / sum(fastest)}.get(
+        "".join(fields), fastest[0]
+    )
+    whole = next(iter(fields.values()), sum(fastest))
+    assert made.law.duration == pytest.approx(whole, rel=1e-9)
+    place, speed = (float(made.law.evaluate(halt, order)[0]) for order in (0, 1))
+    assert (place, speed) == (pytest.approx(0.3, abs=1e-9), pytest.approx(0.0, abs=1e-7))
+    assert float(made.law.evaluate(made.law.end)[0]) == pytest.approx(0.9)
+    assert np.abs(made.breaks - halt).min() < 1e-9
+    assert (np.diff(made.breaks) > 0).all()
+    assert made.breaks[-1] == pytest.approx(whole)
+    if made.phases:
+        assert made.phases[-1].end == pytest.approx(whole)
+        assert min(abs(phase.start - halt) for phase in made.phases) < 1e-9
