@@ -54,7 +54,8 @@ def tried(file: str, mutants: Sequence[Planted], folders: SimpleQueue[Path]) -> 
     tests, folder = subjects()[file], folders.get()
     try:
         if not passes(folder, tests):
-            return [f"{file}: its tests fail without a mutant"] * len(mutants)
+            print(f"{file}: its tests fail without a mutant: {len(mutants)} not tried", flush=True)
+            return [file] * len(mutants)
         outcomes = [(mutant, outcome_of(mutant, tests, folder)) for mutant in mutants]
         wrong = [
             f"{file}: {outcome}\n    - {mutant.text}\n    + {mutant.change}"
