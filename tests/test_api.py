@@ -293,4 +293,6 @@ def test_words_that_mean_nothing_are_refused(tmp_path: Path) -> None:
         trajcli.plan(CUBIC).save(tmp_path / "rows.csv", digits="all")  # type: ignore[arg-type]
     with pytest.raises(trajcli.InputError, match=r"moves\.0\.duration has no values"):
         trajcli.sweep(EXAMPLES / "cubic.yaml", {"moves.0.duration": []})
+    with pytest.raises(trajcli.InputError, match=r"a page is HTML, and 'view\.txt' is"):
+        trajcli.view(EXAMPLES / "cubic.yaml", tmp_path / "view.txt")
     assert not [*tmp_path.iterdir()]

@@ -228,8 +228,9 @@ def view(
         PlanningError: When a move has no curve.
         FileError: When a file cannot be read or written.
     """
-    from trajcli.player.page import page_of
+    from trajcli.player.page import check_page_name, page_of
 
+    check_page_name(str(output))
     scene = _scene_of(source, robot, meshes)
     if beside is not None:
         from trajcli.player.compared import scene_of_two

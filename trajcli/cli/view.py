@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,17 +12,15 @@ from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import frozen
-from trajcli.player.page import page_of
+from trajcli.player.page import check_page_name, page_of
 from trajcli.player.scene import BUDGET
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion
-from trajcli.streams.whole_file import identity, is_special, standard_output, whole_file
+from trajcli.streams.whole_file import identity, standard_output, whole_file
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import ViewCommand
     from trajcli.judge.file import CheckedFile
-
-_ENDINGS = (".html", ".htm")
 
 
 def run_view(options: ViewCommand) -> int:
@@ -149,11 +146,8 @@ def _check_output(path: str | None) -> None:
     if path is None or path == "-":
         if sys.stdout is not None and sys.stdout.isatty():
             raise InputError("a page is not printed on a terminal", hint="say where it goes: -o view.html")
-    elif not (path.lower().endswith(_ENDINGS) or is_special(path)):
-        name = Path(path).name
-        raise InputError(
-            f"a page is HTML, and '{name}' is the name of something else", hint="name it like view.html"
-        )
+    else:
+        check_page_name(path)
 
 
 def _check_inputs_stay(output: str | None, inputs: Sequence[str]) -> None:

@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from trajcli.errors import InputError
+from trajcli.streams.whole_file import is_special
 
 BUNDLE = Path(__file__).parent / "bundle"
 """What `make player` builds from the folder player/ of the repository."""
 
+_ENDINGS = (".html", ".htm")
 _LEVEL = 6  # of gzip: level 9 takes twice as long for half a percent
 _PAGE = """<!doctype html>
 <html lang="en">
@@ -37,6 +39,18 @@ _PAGE = """<!doctype html>
 </body>
 </html>
 """
+
+
+def check_page_name(path: str) -> None:
+    """Refuse names of files that promise something else than a page.
+
+    Raises:
+        InputError: When the name ends otherwise.
+    """
+    if not (path.lower().endswith(_ENDINGS) or is_special(path)):
+        name = Path(path).name
+        hint = "name it like view.html"
+        raise InputError(f"a page is HTML, and '{name}' is the name of something else", hint=hint)
 
 
 def page_of(scene: Mapping[str, Any], *, compress: bool = False) -> bytes:
