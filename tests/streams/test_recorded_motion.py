@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from trajcli.errors import InputError, TrajcliError
 from trajcli.streams import recorded_motion
 from trajcli.streams.recorded_motion import open_motion
+from trajcli.streams.row_sources import ColumnExtents
 from trajcli.units import Units
 
 FILES = Path(__file__).parents[1] / "oracles" / "recorded"
@@ -505,3 +506,15 @@ def test_a_joint_in_another_unit_has_decimals_of_its_own(tmp_path: Path) -> None
         joint_types=("revolute", "revolute", "prismatic", "prismatic"),
     ).resolution
     assert resolution.q.tolist() == pytest.approx([5e-4 * pi / 180] * 2 + [5e-9] * 2)
+
+
+@pytest.mark.parametrize("size", [1, 2, 6])
+def test_a_column_stands_where_it_does_so_in_all_blocks(size: int) -> None:
+    """Columns that begin or end elsewhere, above or below, move; one that is 0.3 throughout stands."""
+    rows = np.full((6, 5), 0.3)
+    rows[0, 1], rows[-1, 2], rows[0, 3], rows[-1, 4] = 0.2, 0.2, -0.4, 0.4
+    extents = ColumnExtents(5)
+    for low in range(0, 6, size):
+        extents.add(rows[low : low + size])
+    assert extents.still.tolist() == [True, False, False, False, False]
+    assert extents.largest.tolist() == [0.3, 0.3, 0.3, 0.4, 0.4]

@@ -190,10 +190,10 @@ class TimedRows:
             InputError: When they have a time.
         """
         named = rows.named
-        known = next((name for name in named.names if read_name(name).quantity == TIME), None)
-        if known is not None:
+        stamps = next((name for name in named.names if read_name(name).quantity == TIME), None)
+        if stamps is not None:
             raise named.wrong(
-                f"--rate is about rows without time, and {known} is one", "leave --rate out", known
+                f"--rate is about rows without time, and {stamps} is one", "leave --rate out", stamps
             )
         self._rows, self._rate = rows, rate
         self.format, self.joint_names, self.si = rows.format, rows.joint_names, rows.si
