@@ -60,6 +60,18 @@ def test_the_beginning_of_a_profile_is_completed(name: str, said: str, capfd: Ca
     assert f"did you mean {said}?" in err
 
 
+@pytest.mark.parametrize("option", ["--limits", "--velocity"])
+def test_limits_of_a_job_are_set_in_it(option: str, capfd: Capture) -> None:
+    code, _, err = call(capfd, "plan", ROBOT_JOB, option, "5")
+    assert code == 2
+    assert "--set limits.velocity=NUMBER changes one, in the units of the job" in " ".join(err.split())
+    assert call(capfd, "plan", ROBOT_JOB, "--set", "limits.velocity=60").code == 0
+    code, _, err = call(capfd, "plan", ROBOT_JOB, "--set", "limits.velocity=5")
+    assert code == 1
+    assert "velocity" in err
+    assert "--set" not in call(capfd, "fk", option, "5").err
+
+
 def test_limits_stand_in_a_file_or_between_braces(tmp_path: Path, capfd: Capture) -> None:
     path = tmp_path / "rows.csv"
     path.write_text(ROWS, encoding="utf-8")

@@ -26,6 +26,10 @@ _MEANT = {
     "--json": "rows are JSON with --format jsonl, the report of `plan` with --report FILE, "
     "and `batch` prints nothing else",
 }
+_OF_JOB = {
+    "--limits": "velocity",
+    **{f"--{name}": name for name in ("velocity", "acceleration", "jerk", "effort")},
+}  # what a job says of its limits
 
 
 class Words(typer.core.TyperCommand):
@@ -36,7 +40,11 @@ class Words(typer.core.TyperCommand):
         try:
             return super().parse_args(ctx, args)
         except Exception as error:
-            meant = _MEANT.get(getattr(error, "option_name", ""))
+            name = getattr(error, "option_name", "")
+            meant = _MEANT.get(name)
+            if name in _OF_JOB and any("--set" in param.opts for param in self.get_params(ctx)):
+                key = f"limits.{_OF_JOB[name]}"
+                meant = f"a job says its limits, and --set {key}=NUMBER changes one, in the units of the job"
             if meant is None or type(error).__name__ != "NoSuchOption":
                 raise
             ctx.fail(f"{error}: {meant}")
