@@ -1,8 +1,8 @@
 """Rows that may have been planned for a consumer that nobody names: those with the ends of the job's motion.
 
 A plan for a consumer goes through the same targets, so that a file of it has the first and last positions of
-the motion that the job plans by itself and lasts as long or longer. That tells whether it is
-worth planning for it; then every row is compared.
+the motion that the job plans by itself and lasts longer. That tells whether it is worth planning for it; then
+every row is compared.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from trajcli.streams.reading import open_rows_of
 from trajcli.streams.row_sources import ColumnExtents
 
 _LONGEST = 2.0  # times the motion that the job plans by itself
-_SHORTER = 1e-6  # s: by how much stamps may make it shorter
+_LONGER = 2e-9  # s: what lasts longer by less, by its stamps, is planned for nobody else than the job
+_SAME_STEPS = 2e-6  # s: by how much the steps of stamps at one rate differ
 _OFF = 1e-9  # rad or m: what is the same position, beside its decimals
 _OF_PERIOD = 1e-6  # relative: stamps of one rate
 _REMEDIES = ("slowed", "other_rows", "for_consumer")  # events of a plan that is another one for its consumer
@@ -101,11 +102,11 @@ def consumers_of(
 
 
 def _fits(ends: _Ends, plan: Plan) -> bool:
-    """Return whether a file begins and ends where the motion does, and lasts about as long."""
+    """Return whether a file begins and ends where the motion does, and lasts longer, but not much."""
     curve, duration = plan.trajectory.curve, plan.trajectory.duration
     begun = curve.evaluate(curve.start, 0)
     ended = curve.evaluate(curve.end, 0, side="left")
-    if ends.first.size != begun.size or not duration - _SHORTER <= ends.duration <= _LONGEST * duration:
+    if ends.first.size != begun.size or not duration + _LONGER < ends.duration <= _LONGEST * duration:
         return False
     off = np.maximum(np.abs(ends.first - begun), np.abs(ends.last - ended))
     return bool((off <= ends.slack + _OFF).all())
@@ -152,7 +153,7 @@ def _rate_of(t: Array) -> float | None:
         return None
     whole = steps[:-1]
     period = float(whole.mean())
-    if np.ptp(whole) > 2 * _SHORTER:
+    if np.ptp(whole) > _SAME_STEPS:
         return None
     rate = 1.0 / period
     return float(round(rate)) if abs(rate - round(rate)) <= _OF_PERIOD * max(rate, 1.0) else rate
