@@ -31,16 +31,16 @@ class CycleTimes:
         pilz: By Pilz's rule, slowed evenly until limits are kept.
         justblend: By justblend.
         ours: As planned and verified.
-        bound: Below which no motion through the zones is, or none was found.
-        method: Of the bound: proven, searched.
+        bound: Below which no motion through the zones is; None for none.
+        method: Of the bound: proven, second_order; None for none.
     """
 
     stopping: float
     pilz: float | None
     justblend: float | None
     ours: float
-    bound: float
-    method: str
+    bound: float | None
+    method: str | None
 
 
 def cycle_times(job: dict[str, Any], metres: float) -> CycleTimes:
@@ -63,8 +63,8 @@ def cycle_times(job: dict[str, Any], metres: float) -> CycleTimes:
         _sum(pilz(chain, [zone] * (len(chain) - 1)) for chain in chains),
         _sum(justblend(chain, [zone] * (len(chain) - 1)) for chain in chains) if joints else None,
         flying.trajectory.duration - holds,
-        bound.duration - holds,
-        bound.method,
+        None if bound is None else bound.duration - holds,
+        None if bound is None else bound.method,
     )
 
 
@@ -96,7 +96,7 @@ def _row(name: str, zone: str, times: CycleTimes) -> str:
         "" if times.pilz is None else f"{times.pilz:.4f}",
         "" if times.justblend is None else f"{times.justblend:.4f}",
         f"**{times.ours:.4f}**",
-        f"{times.bound:.4f} {times.method}",
+        "" if times.bound is None else f"{times.bound:.4f} {times.method}",
     ]
     return f"| {' | '.join([name, zone, *cells])} |"
 

@@ -223,8 +223,8 @@ def test_the_report_says_what_kind_of_bound_it_has(few_programmes: None) -> None
     assert line.endswith(f"bound: {report.bound.duration:.6g} s (proven)")
     longer = report_of(planned([0.9, 1.25], [1.0, 2.0], [0.2, 1.0], more_zones=True)).flyby
     assert longer is not None
-    assert longer.bound.method == "searched"
-    assert longer.bound.duration <= longer.duration
+    assert longer.bound.method == "second_order"
+    assert 0.8 * longer.duration <= longer.bound.duration <= longer.duration
 
 
 def test_a_start_in_motion_and_bent_paths_have_no_proof() -> None:

@@ -58,11 +58,13 @@ def campaign(seeds: range | list[int]) -> dict[str, float]:
         limits = [move.robot.limits for move in plan.moves]
         assert not broken_limits(plan.trajectory, limits)[0], seed
         assert not step_breakers(plan.trajectory, limits), seed
-        assert flyby.bound <= flyby.duration <= flyby.stopping * (1 + 1e-12), seed
+        assert flyby.searched <= flyby.duration <= flyby.stopping * (1 + 1e-12), seed
+        bound = flyby.second_order
+        assert bound is None or 0.5 * flyby.duration < bound <= flyby.duration, seed
         _judge_places(seed, plan, points, zone)
         figures["programs"] += 1
         figures["fly"] += bool(flyby.zones)
-        saved, above = 1 - flyby.duration / flyby.stopping, flyby.duration / flyby.bound - 1
+        saved, above = 1 - flyby.duration / flyby.stopping, flyby.duration / (bound or flyby.duration) - 1
         figures["largest share saved"] = max(figures["largest share saved"], saved)
         figures["largest share above the bound"] = max(figures["largest share above the bound"], above)
     return figures

@@ -179,8 +179,8 @@ def _flown_by(explained: Explanation) -> Iterator[str]:
     """Yield the line about what flying by corners gained, and its bound."""
     flyby = explained.flyby
     if flyby is not None and flyby.zones:
-        bound = f"bound: {flyby.bound.duration:.6g} s ({flyby.bound.method})"
-        yield f"flying by its corners: {flyby.duration:.6g} s, stopping there {flyby.stopping:.6g} s; {bound}"
+        bound = "" if flyby.bound is None else f"; bound: {flyby.bound.duration:.6g} s ({flyby.bound.method})"
+        yield f"flying by its corners: {flyby.duration:.6g} s, stopping there {flyby.stopping:.6g} s{bound}"
 
 
 def _zones(explained: Explanation, move: int) -> Iterator[str]:

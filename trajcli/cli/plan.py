@@ -397,7 +397,8 @@ def _flown(flyby: FlyBy) -> str:
     count, saved = len(flyby.zones), 1 - flyby.duration / flyby.stopping
     corners = f"flies by {count} corner{'s' * (count != 1)}"
     gained = f"{100 * saved:.3g} % less than the {flyby.stopping:.6g} s of stopping there"
-    return f"{corners}: {gained}; bound: {flyby.bound:.6g} s (searched)"
+    bound = "" if flyby.second_order is None else f"; bound: {flyby.second_order:.6g} s (second_order)"
+    return f"{corners}: {gained}{bound}"
 
 
 def _steps(plan: Plan) -> str:

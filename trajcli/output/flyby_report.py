@@ -18,12 +18,13 @@ def flyby_report(flyby: FlyBy, types: Sequence[JointType], names: Sequence[str])
         types: Of the joints.
         names: Of the joints.
     """
-    bound, method = flyby.best_bound
+    bound = flyby.best_bound
     return FlyByReport(
         duration=flyby.duration,
         stopping=flyby.stopping,
         saved=flyby.stopping - flyby.duration,
-        bound=BoundReport(duration=bound, method=method),
+        bound=None if bound is None else BoundReport(duration=bound[0], method=bound[1]),
+        searched=flyby.searched,
         zones=[_zone(zone, types, names) for zone in flyby.zones],
     )
 

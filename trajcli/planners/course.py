@@ -88,6 +88,11 @@ class Course(ABC):
         """Whether its bounds are the same everywhere."""
         return self.curve.degree == 1 and self.curve.pieces == 1 and not self.limits_tool
 
+    @property
+    def limits_along(self) -> tuple[float, float, float] | None:
+        """Limits of sd, sdd and -sdd by those of the tool, where s is the length of its path; else None."""
+        return None
+
     @abstractmethod
     def tool_rates(self, s: Array) -> Array:
         """Return sizes of p', p'', w and w' at s (m,), (4, m)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -14,10 +14,11 @@ from trajcli.kinematics.robot import Robot
 from trajcli.planners.flying_by import (
     FlownChain,
     FlownZone,
+    close_bound,
     flown,
     flown_zones,
     moves_as_flown,
-    proven_bounds,
+    second_order_bound,
     stretched_chain,
     zone_events,
 )
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from trajcli.kinematics.zone import Zone
     from trajcli.planning.adaptation import Adaptation
 
-BoundMethod = Literal["proven", "searched", "second_order"]
+BoundMethod = Literal["proven", "second_order"]
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _FASTER = 1e-9  # relative: a chain that gains less stops
 
@@ -40,29 +41,48 @@ class FlyBy:
     Attributes:
         duration: Of the job, s.
         stopping: Of the job with a stop at every corner, s.
-        bound: Duration below which no motion through these zones was found, s.
+        searched: Of the fastest motion that was found, before limits that it passed lowered its pace, s.
         zones: In order of time.
         chains: Those that fly; None where one stops although zones are named.
     """
 
     duration: float
     stopping: float
-    bound: float
+    searched: float
     zones: tuple[FlownZone, ...]
     chains: tuple[FlownChain, ...] | None
 
     @cached_property
-    def best_bound(self) -> tuple[float, BoundMethod]:
-        """Duration below which no motion through these zones is, s, and how that is known.
+    def second_order(self) -> float | None:
+        """Duration below which no motion through these zones is, s; None where a chain stops."""
+        if self.chains is None:
+            return None
+        return self._with(second_order_bound(chain) for chain in self.chains)
 
-        It is proven where each chain is two straight moves in joint space, which takes some seconds for each;
-        else it is the one that the search found.
+    @cached_property
+    def best_bound(self) -> tuple[float, BoundMethod] | None:
+        """The highest duration that is known to be such a bound, s, and how it is known.
+
+        Two straight moves in joint space have a proof that takes some seconds for each chain; others one that
+        leaves out most limits of jerk. It is named after the weakest.
         """
-        proven = proven_bounds(self.chains) if self.chains else None
-        if not self.chains or proven is None:
-            return self.bound, "searched"
-        saved = math.fsum(chain.duration - least for chain, least in zip(self.chains, proven, strict=True))
-        return self.duration - saved, "proven"
+        if self.chains is None or self.second_order is None:
+            return None
+        close = [close_bound(chain) for chain in self.chains]
+        if None in close and not any(close):
+            return self.second_order, "second_order"
+        found = [
+            max(second_order_bound(chain), bound or 0.0)
+            for chain, bound in zip(self.chains, close, strict=True)
+        ]
+        return self._with(found), "second_order" if None in close else "proven"
+
+    def _with(self, bounds: Iterable[float]) -> float:
+        """Return the duration of the job if each chain lasted as long as its bound, s."""
+        chains = self.chains or ()
+        return self.duration - math.fsum(
+            chain.duration - bound for chain, bound in zip(chains, bounds, strict=True)
+        )
 
 
 def flown_plan(

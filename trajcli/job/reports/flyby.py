@@ -57,7 +57,17 @@ class FlyByReport(ReportPart):
     duration: ReportSeconds
     stopping: Annotated[float, Field(description="Of the job with a stop in every corner, s.")]
     saved: Annotated[float, Field(description="The difference, s.")]
-    bound: BoundReport
+    bound: Annotated[
+        BoundReport | None,
+        Field(description="Null where moves stop although zones are named; others last as planned."),
+    ]
+    searched: Annotated[
+        float,
+        Field(
+            description="Of the fastest motion of the job that was found, before limits that it passed "
+            "lowered its pace, s; it proves nothing."
+        ),
+    ]
     zones: list[ZoneReport]
 
 
@@ -71,12 +81,13 @@ class SignalReport(ReportPart):
 
 
 class BoundReport(ReportPart):
-    """How fast a motion through these zones may be at most."""
+    """A duration that no motion through these zones falls below."""
 
     duration: Annotated[float, Field(description="Of the whole job, holds included, s.")]
     method: Annotated[
-        Literal["proven", "searched", "second_order"],
+        Literal["proven", "second_order"],
         Field(
-            description="proven: no motion is faster; searched: what a search found, which proves nothing."
+            description="No motion is faster in either case. proven: all limits of joints count; "
+            "second_order: without limits of jerk but next to stops."
         ),
     ]

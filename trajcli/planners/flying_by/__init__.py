@@ -7,15 +7,16 @@ from trajcli.planners.flying_by.flown_moves import (
     stretched_chain,
     zone_events,
 )
-from trajcli.planners.flying_by.within_limits import FlownChain, flown, proven_bounds
+from trajcli.planners.flying_by.within_limits import FlownChain, close_bound, flown, second_order_bound
 
 __all__ = [
     "FlownChain",
     "FlownZone",
+    "close_bound",
     "flown",
     "flown_zones",
     "moves_as_flown",
-    "proven_bounds",
+    "second_order_bound",
     "stretched_chain",
     "zone_events",
 ]

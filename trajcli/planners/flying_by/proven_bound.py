@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits
-from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
+from trajcli.planners.flying_by.between_stops import FlyByChain
 
 _GRIDS = (
     (0.3, 4, 3),
@@ -95,11 +95,10 @@ def least_duration(chain: FlyByChain, duration: float) -> float:
     """Return a duration, s, that no motion of a chain falls below.
 
     Args:
-        chain: One that `is_provable`.
+        chain: One that `is_provable`, with the borders of its whole zone.
         duration: Of a motion that is known, s.
     """
-    whole = chain_of(chain.courses, [corner.around for corner in chain.corners], chain.ends, [1.0])
-    programmes = [ShareProgramme(whole, line, zone) for _, line, zone in _GRIDS]
+    programmes = [ShareProgramme(chain, line, zone) for _, line, zone in _GRIDS]
     queue = [(0.0, 0, ShareBox((0.0, 0.0), (1.0, 1.0)))]
     count = 0
     while count < _PROGRAMMES and queue[0][0] < duration * (1 - _ENOUGH):

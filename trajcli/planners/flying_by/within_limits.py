@@ -47,28 +47,46 @@ class FlownChain:
         chain: Its courses and zones.
         parts: Of the motion: courses and zones in turns.
         model: Duration of the fastest chain that was found, before the pace of any part was lowered, s.
+        robots: Of each course, with the limits that its move has to keep: it may be planned within others.
     """
 
     moves: tuple[int, ...]
     chain: FlyByChain
     parts: tuple[FlownPart, ...]
     model: float
+    robots: tuple[Robot, ...]
 
     @property
     def duration(self) -> float:
         """Seconds."""
         return math.fsum(part.curve.duration for part in self.parts)
 
+    @property
+    def allowed(self) -> FlyByChain:
+        """The chain under the limits that its moves have to keep, with all of its zones."""
+        courses = [
+            replace(course, robot=robot)  # type: ignore[type-var]
+            for course, robot in zip(self.chain.courses, self.robots, strict=True)
+        ]
+        zones = [corner.around for corner in self.chain.corners]
+        return chain_of(courses, zones, self.chain.ends, [1.0] * len(zones))
 
-def proven_bounds(chains: Sequence[FlownChain]) -> list[float] | None:
-    """Return durations, s, below which no motions of chains are; None without a proof of each, or scipy."""
+
+def second_order_bound(chain: FlownChain) -> float:
+    """Return a duration, s, that no motion of a chain falls below, found without most limits of jerk."""
+    from trajcli.planners.flying_by.second_order import second_order_duration
+
+    return second_order_duration(chain.allowed, chain.duration)
+
+
+def close_bound(chain: FlownChain) -> float | None:
+    """Return one close to the fastest motion; None where there is no proof of a chain, or no scipy."""
     if find_spec("scipy") is None:
         return None
     from trajcli.planners.flying_by.proven_bound import is_provable, least_duration
 
-    if not all(is_provable(each.chain) for each in chains):
-        return None
-    return [least_duration(each.chain, each.duration) for each in chains]
+    allowed = chain.allowed
+    return least_duration(allowed, chain.duration) if is_provable(allowed) else None
 
 
 def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequence[Robot]) -> FlownChain:
@@ -92,7 +110,7 @@ def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequenc
     ends = _rates_along(courses[0], moves[0].start), np.zeros(2)
     chain, parts, model = _within_limits(courses, zones, ends)
     indices = tuple(moves[k].index for k in kept)
-    return FlownChain(indices, chain, tuple(parts), model)
+    return FlownChain(indices, chain, tuple(parts), model, tuple(moves[k].robot for k in kept))
 
 
 def _has_length(move: PlannedMove) -> bool:

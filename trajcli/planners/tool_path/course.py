@@ -20,6 +20,9 @@ from trajcli.planners.tool_path.time_optimal import limits_of_law
 
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
 
+_SAMPLES = 33  # of a path, at which it is looked at whether s is its length
+_AWAY = 1e-6  # relative: lengths that differ by more are two
+
 
 @frozen
 class ToolCourse(Course):
@@ -48,6 +51,22 @@ class ToolCourse(Course):
     def limits_tool(self) -> bool:
         """Whether something limits the tool along it."""
         return self.joints.path.speeds is not None or super().limits_tool
+
+    @property
+    def limits_along(self) -> tuple[float, float, float] | None:
+        """Limits of sd, sdd and -sdd by those of the tool; None where the tool goes another way than s.
+
+        s is the length of the path, or its angle; where a coordinate is free the tool may go less far.
+        """
+        tcp = self.tcp
+        turns = self.joints.path.poses.pure_rotation
+        sizes = self.tool_rates(np.linspace(0.0, self.length, _SAMPLES))[2 if turns else 0]
+        if (np.abs(sizes - 1.0) > _AWAY).any():
+            return None
+        speed, change = (
+            (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)
+        )
+        return speed, change, change if self.law.deceleration is None else min(change, self.law.deceleration)
 
     def tool_rates(self, s: Array) -> Array:
         """Return sizes of p', p'', w and w' at s (N,), (4, N)."""
