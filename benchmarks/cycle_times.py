@@ -116,7 +116,7 @@ def _random_row(count: int) -> str:
         for shares in columns[1:]
     ]
     cells[2] = f"**{cells[2]}**"
-    methods = ", ".join(sorted({each.method for each in found}))
+    methods = ", ".join(sorted({each.method for each in found if each.method is not None}))
     name = f"{count} random programs of three joint moves, UR5e, parts of stopping: median (range)"
     return f"| {' | '.join([name, '10 to 80 mm', '1', *cells])} {methods} |"
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from extras import require_module, require_program
+from extras import require_module
+from one_browser import RUNNING, started
 
-from docs.player_picture import BROWSERS, browser, wait_until
+from docs.player_picture import wait_until
 
 
 class Viewed:
@@ -38,11 +39,14 @@ class Viewed:
         return float(self.page.evaluate("trajcli.clock.time"))
 
 
+def pytest_sessionfinish() -> None:
+    RUNNING.close()
+
+
 @pytest.fixture(scope="session")
-def chromium() -> Iterator[Any]:
+def chromium() -> Any:
     require_module("playwright")
-    with browser(require_program(*BROWSERS)) as started:
-        yield started
+    return started()
 
 
 @pytest.fixture
