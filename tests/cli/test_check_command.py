@@ -276,3 +276,35 @@ def test_limits_files_may_be_of_moveit(capfd: pytest.CaptureFixture[str]) -> Non
     code, _, err = call(capfd, "check", GOAL, "--robot", "ur10e", "--limits", file)
     assert code in (0, 1, 2)
     assert "Traceback" not in err
+
+
+def test_values_of_the_job_are_overridden_as_when_it_was_planned(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    job, rows = EXAMPLES / "cubic.yaml", tmp_path / "slower.csv"
+    slower = ("--set", "moves.0.duration=1.25")
+    assert call(capfd, "plan", job, *slower, "-o", rows).code == 0
+    assert view(capfd, rows, "--job", job)[1]["planned_rows"] is False
+    code, found = view(capfd, rows, "--job", job, *slower)
+    assert (code, found["planned_rows"], found["findings"]) == (0, True, [])
+    # a limit below the largest velocity of the cubic, 1.5 times its mean
+    tight = view(capfd, rows, "--job", job, *slower, "--set", "limits.velocity=1")
+    assert tight[0] == 1
+    assert "velocity" in {finding["kind"] for finding in tight[1]["findings"]}
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--robot", "ur5e", "--set", "limits.velocity=1"), "and there is none"),
+        (("--job", EXAMPLES / "cubic.yaml", "--limits", "{velocity: 1}"), "--set limits.KEY=VALUE"),
+        (("--job", EXAMPLES / "cubic.yaml", "--set", "limit.velocity=1"), "unknown key 'limit'"),
+        (("--job", EXAMPLES / "cubic.yaml", "--velocity", "1"), "--set limits.velocity=NUMBER"),
+    ],
+)
+def test_a_limit_that_is_overridden_is_one_of_a_job(
+    words: tuple[str | Path, ...], text: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = call(capfd, "check", GOAL, *words)
+    assert (code, out) == (2, "")
+    assert text in err

@@ -170,6 +170,7 @@ class CheckCommand(Command):
         str | None,
         typer.Option("--job", metavar="JOB", help="Robot, limits, start, end and paths that it shall keep."),
     ] = None
+    override: Overrides = []
     robot: Annotated[
         str | None,
         typer.Option(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -45,6 +45,7 @@ class CheckOptions:
     """What is said beside the file; see `trajcli check --help`."""
 
     job: str | None = None
+    override: Sequence[str] = ()
     robot: str | None = None
     limits: str | None = None
     columns: str | None = None
@@ -327,10 +328,12 @@ def _given(options: CheckOptions) -> _Given:
     if options.job is not None:
         if options.robot is not None or options.limits is not None:
             other = "--robot" if options.robot is not None else "--limits"
-            raise InputError(
-                f"--job says robot and limits itself, and {other} is given", hint="name one of them"
-            )
-        return _of_job(options.job)
+            hint = "name one of them; --set limits.KEY=VALUE changes a limit of the job"
+            raise InputError(f"--job says robot and limits itself, and {other} is given", hint=hint)
+        return _of_job(options.job, options.override)
+    if options.override:
+        hint = "name the job with --job, or leave it out"
+        raise InputError("--set overrides values of a job, and there is none", hint=hint)
     if options.robot is None:
         raise InputError(
             "what is the motion judged by?", hint="name a job with --job, or an arm with --robot"
@@ -354,12 +357,12 @@ def _given(options: CheckOptions) -> _Given:
     return _Given(robot, sheet.units, conceded, shown=units)
 
 
-def _of_job(path: str) -> _Given:
+def _of_job(path: str, overrides: Sequence[str]) -> _Given:
     """Return what a job says: its limits, and where it can be planned its paths, start and end."""
     from trajcli.job.read import load_job
     from trajcli.planning.plan import plan_job
 
-    loaded = load_job(path)
+    loaded = load_job(path, overrides)
     try:
         with np.errstate(all="ignore"):
             return _of_plan(plan_job(loaded))
