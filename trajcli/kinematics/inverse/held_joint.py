@@ -22,7 +22,6 @@ from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns
 from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
-from trajcli.kinematics.inverse.numeric import damped_step
 from trajcli.kinematics.inverse.target import IkTarget
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
@@ -41,6 +40,7 @@ _CLOSED = 1e-8  # scaled error: after its correction the square is left
 _LONGEST = 0.2  # rad, of one step along the manifold
 _LEAST_CURVATURE = 0.05  # of half the squared distance along the manifold
 _AT_LIMIT = 1e-9  # rad: this near to its limit a joint is at it
+_ABOUT_AXES = (2, 0, 1), (1, 2, 0)  # entries of a turn's antisymmetric part
 _DAMPING = 1e-15  # keeps the correction of an exactly singular arm solvable
 
 
@@ -170,6 +170,7 @@ class _Slide:
         inside = np.abs(beyond(start, robot.limits.position)).max(axis=1) < _LONGEST
         self._low = np.where(inside[:, None], low, np.minimum(low, start))
         self._high = np.where(inside[:, None], high, np.maximum(high, start))
+        self._bounds = np.stack([self._low, self._high])
         self._length = characteristic_length(robot)
         self.joints = start.copy()
         self.settled: Flags = np.zeros(len(start), dtype=bool)
@@ -202,7 +203,7 @@ class _Slide:
                 flipped = np.where(np.einsum("kn,kn->k", null, last[0]) < 0.0, -1.0, 1.0)
                 null, gap = null * flipped[:, None], gap * flipped
                 curvature = _secant(curvature, gap - last[1], last[2])
-            step = self._limited(rows, q, null, np.clip(gap / curvature, -_LONGEST, _LONGEST))
+            step = self._limited(rows, q, null, _short(gap / curvature))
             self.joints[rows] = q + step[:, None] * null
             going = (np.abs(step) > _LAST) | (error > _CLOSED)
             self.settled[rows[~going]] = True
@@ -218,25 +219,43 @@ class _Slide:
         wanted, compute = self._poses[rows], poses_and_jacobians if len(rows) <= FEW else linearisation
         poses, slopes = compute(self._robot, q)
         turned = wanted[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)
+        turned -= np.swapaxes(turned, 1, 2).copy()
         errors = np.empty((len(rows), 6))
         errors[:, :3] = (wanted[:, :3, 3] - poses[:, :3, 3]) / self._length
-        for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):  # the sine of a small turn, about its axis
-            errors[:, 3 + i] = 0.5 * (turned[:, j, k] - turned[:, k, j])
+        errors[:, 3:] = 0.5 * turned[(slice(None), *_ABOUT_AXES)]  # the sine of a small turn, about its axis
         slopes[:, :3] /= self._length
-        correction = damped_step(errors, slopes, np.full(len(rows), _DAMPING))
-        null = np.linalg.qr(np.swapaxes(slopes, 1, 2), mode="complete")[0][..., -1]
-        return np.abs(errors).max(axis=1), correction, null
+        return np.abs(errors).max(axis=1), *_correction_and_null(errors, slopes)
 
     def _limited(self, rows: NDArray[np.intp], q: Array, null: Array, step: Array) -> Array:
         """Return steps that leave all joints inside their limits, as far as the null vector goes there."""
         moves = np.abs(null) > _AT_LIMIT
-        safe = np.where(moves, null, 1.0)
-        with np.errstate(invalid="ignore"):
-            ends = np.stack([(self._low[rows] - q) / safe, (self._high[rows] - q) / safe])
-        least = np.where(moves, ends.min(axis=0), -np.inf).max(axis=1)
-        most = np.where(moves, ends.max(axis=0), np.inf).min(axis=1)
-        limited = np.minimum(np.maximum(step, least), most)
-        return np.where(least <= most, np.clip(limited, -_LONGEST, _LONGEST), 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = (self._bounds[:, rows] - q) / null
+        least = np.where(moves, np.minimum(ends[0], ends[1]), -np.inf).max(axis=1)
+        most = np.where(moves, np.maximum(ends[0], ends[1]), np.inf).min(axis=1)
+        limited = _short(np.minimum(np.maximum(step, least), most))
+        return np.where(least <= most, limited, 0.0)
+
+
+def _correction_and_null(errors: Array, slopes: Array) -> tuple[Array, Array]:
+    """Return the shortest corrections (K, n) of errors (K, m), and unit null vectors (K, n) of the slopes.
+
+    Both follow from one solution: the unit matrix without its part in the rows of the slopes is the null
+    vector times itself, and its row with the largest diagonal entry is taken, so that nothing cancels.
+    """
+    count, joints = len(slopes), slopes.shape[2]
+    transposed = np.swapaxes(slopes, 1, 2)
+    system = slopes @ transposed + _DAMPING * np.eye(slopes.shape[1])
+    solved = transposed @ np.linalg.solve(system, np.concatenate([slopes, errors[..., None]], axis=2))
+    left = np.eye(joints) - solved[..., :joints]
+    sizes = np.diagonal(left, axis1=1, axis2=2)
+    each, longest = np.arange(count), sizes.argmax(axis=1)
+    return solved[..., joints], left[each, longest] / np.sqrt(sizes[each, longest])[:, None]
+
+
+def _short(step: Array) -> Array:
+    """Return steps along the manifold, none of them longer than the longest that is taken."""
+    return np.minimum(np.maximum(step, -_LONGEST), _LONGEST)
 
 
 def _secant(curvature: Array, change: Array, step: Array) -> Array:

@@ -22,21 +22,32 @@ FEW = 32  # configurations of a redundant arm up to which products of matrices a
 class _Constants(NamedTuple):
     """What does not depend on the joints of an arm.
 
+    The product of a joint's own matrix with that to the next axis, or to the tcp, is
+    `cos(angle) * along + sin(angle) * across + slide * slid + fixed`, each of shape (n, 1, 4, 4).
+
     Attributes:
         first: From world to the axis of the first joint, (4, 4).
-        after: From each joint to the axis of the next, from the last to the tcp, (n, 1, 4, 4).
-        sign: Of each joint, (n, 1).
+        along: Times the cosine.
+        across: Times the sine.
+        slid: Times the slide of a joint.
+        fixed: What no joint changes.
+        sign: Of each joint, (n,).
         angle: At zero, (n, 1).
-        distance: At zero, (n, 1).
-        sliding: Which joints slide, (n, 1).
+        turning: Sign of joints that turn, zero for the others, (n, 1).
+        sliding: Which joints slide, (n,).
+        slides: Whether any does.
     """
 
     first: Array
-    after: Array
+    along: Array
+    across: Array
+    slid: Array
+    fixed: Array
     sign: Array
     angle: Array
-    distance: Array
+    turning: Array
     sliding: Flags
+    slides: bool
 
 
 @lru_cache(maxsize=16)
@@ -45,9 +56,17 @@ def _constants(robot: Robot) -> _Constants:
     screws = [[_screw(*link.before) for link in links], [_screw(*link.after) for link in links]]
     following = [*screws[0][1:], robot.tool]
     after = np.array([own @ next_one for own, next_one in zip(screws[1], following, strict=True)])
-    rows = np.array([[link.sign, link.theta, link.d] for link in links])[..., None]
-    sliding = np.array([link.prismatic for link in links])[:, None]
-    return _Constants(robot.base @ screws[0][0], after[:, None], rows[:, 0], rows[:, 1], rows[:, 2], sliding)
+    sign, angle, distance = np.array([[link.sign, link.theta, link.d] for link in links]).T
+    sliding = np.array([link.prismatic for link in links])
+    quarter, lift = np.zeros((4, 4)), np.zeros((4, 4))
+    quarter[1, 0], quarter[0, 1], lift[2, 3] = 1.0, -1.0, 1.0
+    still = np.diag([0.0, 0.0, 1.0, 1.0]) + distance[:, None, None] * lift
+    parts = (np.diag([1.0, 1.0, 0.0, 0.0]), quarter, sign[:, None, None] * lift, still)
+    along, across, slid, fixed = ((part @ after)[:, None] for part in parts)
+    turning = np.where(sliding, 0.0, sign)[:, None]
+    base = robot.base @ screws[0][0]
+    slides = bool(sliding.any())
+    return _Constants(base, along, across, slid, fixed, sign, angle[:, None], turning, sliding, slides)
 
 
 def _screw(a: float, cosine: float, sine: float) -> Array:
@@ -68,28 +87,22 @@ def poses_and_jacobians(robot: Robot, q: Array) -> tuple[Array, Array]:
         InputError: When the robot has none.
     """
     known, values = _constants(robot), q.T
-    change = known.sign * values
-    angles = np.where(known.sliding, known.angle, known.angle + change)
-    local = np.zeros((*values.shape, 4, 4))
-    cosine, sine = np.cos(angles), np.sin(angles)
-    local[..., 0, 0] = local[..., 1, 1] = cosine
-    local[..., 1, 0], local[..., 0, 1] = sine, -sine
-    local[..., 2, 3] = np.where(known.sliding, known.distance + change, known.distance)
-    local[..., 2, 2] = local[..., 3, 3] = 1.0
-    local = local @ known.after
+    angles = (known.angle + known.turning * values)[..., None, None]
+    local = np.cos(angles) * known.along + np.sin(angles) * known.across + known.fixed
+    if known.slides:
+        slides = np.where(known.sliding[:, None], values, 0.0)
+        local += slides[..., None, None] * known.slid
     frames = np.empty((len(values) + 1, len(q), 4, 4))
     frames[0] = known.first
-    for i in range(len(values)):
-        np.matmul(frames[i], local[i], out=frames[i + 1])
-    axes = frames[:-1, :, :3, 2] * known.sign[..., None]
-    arms = frames[-1, :, :3, 3] - frames[:-1, :, :3, 3]
+    for before, link, behind in zip(frames, local, frames[1:], strict=False):
+        np.matmul(before, link, out=behind)
+    up, origin = frames[..., :3, 2:].T  # each (3, K, n + 1)
+    axes, arms = up[..., :-1] * known.sign, origin[..., -1:] - origin[..., :-1]
     jacobians = np.empty((len(q), 6, len(values)))
-    linear = np.moveaxis(jacobians, 2, 0)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        linear[..., i] = axes[..., j] * arms[..., k] - axes[..., k] * arms[..., j]
-    linear[..., 3:] = axes
-    if known.sliding.any():
-        sliding = known.sliding[:, 0]
-        linear[sliding, :, :3], linear[sliding, :, 3:] = axes[sliding], 0.0
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        jacobians[:, i] = axes[j] * arms[k] - axes[k] * arms[j]
+        jacobians[:, 3 + i] = axes[i]
+    if known.slides:
+        jacobians[:, :3] = np.where(known.sliding, jacobians[:, 3:], jacobians[:, :3])
+        jacobians[:, 3:] = np.where(known.sliding, 0.0, jacobians[:, 3:])
     return frames[-1], jacobians

@@ -189,7 +189,7 @@ def distinct(robot: Robot, joints: Array, usable: Flags, within: float = SAME) -
     """
     turning = revolute(robot)
     keep = usable.copy()
-    for i in range(1, joints.shape[1]):
+    for i in np.flatnonzero(usable[:, 1:].any(axis=0)) + 1:
         gap = joints[:, :i] - joints[:, i, None]
         gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
         same = (np.abs(gap).max(axis=-1) <= within) & keep[:, :i]
