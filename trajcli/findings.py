@@ -145,6 +145,16 @@ def excess_amounts(joints: NamedJoints, joint: int, order: int, value: float, li
     return amounts
 
 
+def tool_excess_amounts(
+    value: float, limit: float, order: int, dimension: Literal["length", "angle"]
+) -> Amounts:
+    """Return a value of the tool beyond its limit, and the limit, rounded so that both pass."""
+    return {
+        "value": Amount(value, order, None, dimension, "up"),
+        "limit": Amount(limit, order, None, dimension, "down"),
+    }
+
+
 def at_time(time: float) -> str:
     """Return the words that say when, in s from the start of the trajectory."""
     return f"at t = {time:.9g} s"

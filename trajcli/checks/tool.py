@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount
-from trajcli.findings import Finding, FindingMethod, at_time
+from trajcli.findings import Finding, FindingMethod, at_time, tool_excess_amounts
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import changes_of_sign, characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -150,10 +149,7 @@ def _check_path(tool: SampledTool) -> list[Finding]:
                 method=method,
                 hint="this is a bug: report it",
                 message=f"the tool {what} its path by {{value}} {at_time(when)}, promised were {{limit}}",
-                amounts={
-                    "value": Amount(value, 0, None, dimension, "up"),
-                    "limit": Amount(limit, 0, None, dimension, "down"),
-                },
+                amounts=tool_excess_amounts(value, limit, 0, dimension),
             )
             findings.append(finding)
     return findings

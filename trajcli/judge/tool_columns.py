@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from trajcli.columns import Column, group_of, kinds_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.findings import Collector, Finding, at_time
+from trajcli.findings import Collector, Finding, at_time, tool_excess_amounts
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import matrix_from_quaternion
 from trajcli.judge.motion import MotionJudge, Requirements
@@ -338,10 +338,7 @@ class _Judge:
                 quantity=quantity,
                 rounding=limit,
                 message=f"by its columns {subject} {text} {at_time(time)}; rounding explains {{limit}}",
-                amounts={
-                    "value": Amount(value, order, None, dimension, "up"),
-                    "limit": Amount(limit, order, None, dimension, "down"),
-                },
+                amounts=tool_excess_amounts(value, limit, order, dimension),
             )
 
         self._worst.add(

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, horner
-from trajcli.errors import Amount
-from trajcli.findings import Certainty, Collector, Finding, at_time
+from trajcli.findings import Certainty, Collector, Finding, at_time, tool_excess_amounts
 from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.dexterity import changes_of_sign, characteristic_length
@@ -300,8 +299,5 @@ def _deviation(quantity: str, value: float, limit: float, time: float, row: int,
         quantity=quantity,
         rounding=rounding,
         message=f"the tool {what} its path by {{value}} {at_time(time)}, promised are {{limit}}",
-        amounts={
-            "value": Amount(value, 0, None, dimension, "up"),
-            "limit": Amount(limit, 0, None, dimension, "down"),
-        },
+        amounts=tool_excess_amounts(value, limit, 0, dimension),
     )

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts
-from trajcli.findings import Finding, NamedJoints, at_time
+from trajcli.findings import Finding, NamedJoints, at_time, tool_excess_amounts
 from trajcli.frozen import frozen
 from trajcli.kinematics.jacobian import jacobian, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot
@@ -92,7 +90,7 @@ def _stepping(step: ToolStep, kind: LimitKind, begins: float) -> Finding:
         limit=0.0,
         time=time,
         message=f"the {step.kind.words} of the tool steps by {{value}} {at_time(time)}",
-        amounts=_amounts(step.size, 0.0, 2, step.kind.dimension),
+        amounts=tool_excess_amounts(step.size, 0.0, 2, step.kind.dimension),
         hint=_SMOOTH_HINT.format(words=kind.words),
     )
 
@@ -117,16 +115,9 @@ def tool_excess(kind: LimitKind, value: float, limit: float, time: float, *, sti
         time=time,
         factor=factor if np.isfinite(factor) and not still else None,
         message=f"the {kind.words} of the tool reaches {{value}} {at_time(time)}, its limit is {{limit}}",
-        amounts=_amounts(value, limit, order, kind.dimension),
+        amounts=tool_excess_amounts(value, limit, order, kind.dimension),
         method="bounded",
     )
-
-
-def _amounts(value: float, limit: float, order: int, dimension: Literal["length", "angle"]) -> Amounts:
-    return {
-        "value": Amount(value, order, None, dimension, "up"),
-        "limit": Amount(limit, order, None, dimension, "down"),
-    }
 
 
 def limits_tool(robot: Robot) -> bool:
