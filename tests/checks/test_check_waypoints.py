@@ -57,8 +57,10 @@ def test_a_mutant_is_found(mutant, joint, time, value):
     assert finding.value == pytest.approx(value, rel=1e-6)
 
 
-def test_too_late_is_not_there():
-    """The point that is furthest off is named, once for each joint."""
+@pytest.mark.parametrize("together", [1, 2, 100])
+def test_too_late_is_not_there(together, monkeypatch):
+    """The point that is furthest off is named, once for each joint, in whichever block it is."""
+    monkeypatch.setattr("trajcli.checks.via_points._BLOCK", together)
     late = promise([0.0, 2.5, 3.5])
     found = check_waypoints(trajectory(passing()), [late])
     away = np.abs(passing().evaluate(late.times) - POINTS)

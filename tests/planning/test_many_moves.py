@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
 from counted_calls import calls_of
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.job.read import job_from_text
+from trajcli.job.read import job_from_text, load_job
 from trajcli.knots import knots_of
 from trajcli.planning.plan import plan_job
 
@@ -68,10 +69,50 @@ def test_a_million_moves_are_planned_within_two_gibibytes(monkeypatch: pytest.Mo
         "knots._BLOCK",
         "checks.continuity._BLOCK",
         "checks.target._BLOCK",
-        "curves.extrema._INTERVALS",
+        "curves.extrema._PARTS",
         "curves.piecewise._ROWS",
     ):
         monkeypatch.setattr(f"trajcli.{name}", 256)  # so that a few thousand moves are many
     _peak(256)  # what is made once
     each = (_peak(1536) - _peak(768)) / 768
     assert 100 < each < 1700  # bytes; the job as it is read, and what is imported, are below 400 more
+
+
+def _peak_of_points(folder: Path, points: int) -> int:
+    """Return the most memory in use while a spline through recorded points is planned, bytes."""
+    rng = np.random.default_rng(points)
+    rows = np.column_stack([0.1 * np.arange(points), rng.uniform(-1, 1, (points, 6))])
+    start = ", ".join(f"{position:.6f}" for position in rows[0, 1:])
+    (folder / "points.csv").write_text(
+        "t,q1,q2,q3,q4,q5,q6\n" + "\n".join(",".join(f"{x:.6f}" for x in row) for row in rows) + "\n"
+    )
+    (folder / "job.yaml").write_text(
+        "version: 1\nrobot: {joints: 6}\nlimits: {velocity: 1e6, acceleration: 1e9}\noutput: {rate: 1}\n"
+        f"start: {{joints: [{start}]}}\nmoves:\n"
+        "  - {planner: spline, rule: clamped, through: {csv: points.csv}}\n"
+    )
+    loaded = load_job(str(folder / "job.yaml"))
+    tracemalloc.start()
+    try:
+        assert plan_job(loaded).verdict.passed
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_points_take_little_more_memory_than_their_curve(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a million points that is what decides; blocks are made small, so that a few thousand are many."""
+    for name in (
+        "checks.continuity._BLOCK",
+        "checks.via_points._BLOCK",
+        "curves.extrema._PARTS",
+        "curves.piecewise._ROWS",
+        "curves.splines.cubic._ROWS",
+        "curves.splines.cubic._VALUES",
+    ):
+        monkeypatch.setattr(f"trajcli.{name}", 256)
+    each = (_peak_of_points(tmp_path, 4000) - _peak_of_points(tmp_path, 2000)) / 2000
+    of_curve = 8 * (4 * 6 + 1)  # bytes: four coefficients of each of six joints, and a break
+    assert of_curve < each < 2.6 * of_curve  # zeros that nobody writes to are counted too, and are most of it

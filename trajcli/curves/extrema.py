@@ -31,7 +31,7 @@ from trajcli.frozen import frozen
 _STEP = 2.0**-53  # of a piece: a shorter step of the root finder changes nothing
 _STEPS = 120  # twice what bisection alone needs, because at most every second step is not a bisection
 _BLOCK = 2048  # parts of pieces looked at together: what is computed of them stays in the processor's cache
-_INTERVALS = 32_768  # intervals at a time: what is stored of their parts takes some 100 MB at most
+_PARTS = 32_768  # parts of pieces at a time: what is stored of them takes some 20 MB
 _MANY = 64  # parts of pieces from which on it pays to look for roots only where control points leave room
 _SAME = 1e-12  # of the largest value: peaks closer than this are one peak, and the earliest is named
 
@@ -121,23 +121,53 @@ def peaks_between(
         ValueError: When an interval is not within the curve.
     """
     whole = np.asarray(intervals, dtype=np.float64).reshape(-1, 2)
-    if len(whole) > _INTERVALS:
-        starts = range(0, len(whole), _INTERVALS)
-        blocks = [peaks_between(curve, whole[k : k + _INTERVALS], orders) for k in starts]
-        return IntervalPeaks(tuple(map(_joined, zip(*(block.of_orders for block in blocks), strict=True))))
-    windows = _windows(curve, whole)
+    first, last = _pieces_of(curve, whole)
+    counts = last - first + 1
+    if counts.sum() <= _PARTS:
+        return IntervalPeaks(_peaks_of(curve, whole, orders))
+    cut, owner = _cut(curve, whole, first, counts)
+    parts = np.cumsum(np.minimum(counts, _PARTS)[owner])
+    blocks = np.split(cut, np.flatnonzero(np.diff(parts // _PARTS)) + 1)
+    found = zip(*(_peaks_of(curve, block, orders) for block in blocks), strict=True)
+    return IntervalPeaks(tuple(_of_owners(_joined(of_order), owner) for of_order in found))
+
+
+def _cut(
+    curve: PiecewisePolynomial, intervals: Array, first: NDArray[np.intp], counts: NDArray[np.intp]
+) -> tuple[Array, NDArray[np.intp]]:
+    """Return intervals cut at breaks, none with more parts than are looked at together, and whose each is."""
+    cuts = -(-counts // _PARTS)
+    owner = np.repeat(np.arange(counts.size), cuts)
+    number = np.arange(owner.size) - (np.cumsum(cuts) - cuts)[owner]
+    cut, piece = intervals[owner], first[owner] + number * _PARTS
+    inner = number > 0
+    cut[inner, 0] = curve.breaks[piece[inner]]
+    cut[:-1][inner[1:], 1] = cut[1:][inner[1:], 0]
+    return cut, owner
+
+
+def _peaks_of(curve: PiecewisePolynomial, intervals: Array, orders: Sequence[int]) -> tuple[Peaks, ...]:
+    """Return the extremes on intervals (m, 2) whose parts are looked at together, arrays of shape (m, n)."""
+    windows = _windows(curve, intervals)
     ends, worth = _surveyed(curve, windows, orders)
     pairs = np.nonzero(worth)
     chosen, lengths = curve.coefficients[:, windows.piece[pairs[0]], pairs[1]], windows.length[pairs[0]]
     critical = critical_points(chosen[:, :, None], lengths, orders)
-    return IntervalPeaks(
-        tuple(
-            _extremes(
-                at_ends, _within(derivative_coefficients(chosen, order), pairs, inside, windows), windows
-            )
-            for order, at_ends, inside in zip(orders, ends, critical, strict=True)
-        )
+    return tuple(
+        _extremes(at_ends, _within(derivative_coefficients(chosen, order), pairs, inside, windows), windows)
+        for order, at_ends, inside in zip(orders, ends, critical, strict=True)
     )
+
+
+def _of_owners(cuts: Peaks, owner: NDArray[np.intp]) -> Peaks:
+    """Return the extremes of intervals from those of what they were cut into, arrays of shape (m, n)."""
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    low, high = np.minimum.reduceat(cuts.low, first), np.maximum.reduceat(cuts.high, first)
+    same = _SAME * np.maximum(np.abs(low), np.abs(high))
+    at_low, at_high = cuts.low <= (low + same)[owner], cuts.high >= (high - same)[owner]
+    low_time = np.minimum.reduceat(np.where(at_low, cuts.low_time, np.inf), first)
+    high_time = np.minimum.reduceat(np.where(at_high, cuts.high_time, np.inf), first)
+    return Peaks(low, low_time, high, high_time)
 
 
 def _joined(parts: Sequence[Peaks]) -> Peaks:
@@ -335,13 +365,23 @@ class _Windows:
     interval: NDArray[np.intp]
 
 
-def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
-    """Return the parts of pieces that make up intervals (m, 2)."""
+def _pieces_of(curve: PiecewisePolynomial, intervals: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the first and the last piece of which each of the intervals (m, 2) has a part, (m,).
+
+    Raises:
+        ValueError: When an interval is not within the curve.
+    """
     start, end = intervals.T
     if not ((start >= curve.start) & (start <= end) & (end <= curve.end)).all():
         raise ValueError(f"interval outside the curve's domain [{curve.start!r}, {curve.end!r}]")
     low = np.clip(np.searchsorted(curve.breaks, start, "right") - 1, 0, curve.pieces - 1)
-    high = np.clip(np.searchsorted(curve.breaks, end, "left") - 1, low, curve.pieces - 1)
+    return low, np.clip(np.searchsorted(curve.breaks, end, "left") - 1, low, curve.pieces - 1)
+
+
+def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
+    """Return the parts of pieces that make up intervals (m, 2)."""
+    start, end = intervals.T
+    low, high = _pieces_of(curve, intervals)
     counts = high - low + 1
     first = np.cumsum(counts) - counts
     interval = np.repeat(np.arange(counts.size), counts)
@@ -349,7 +389,8 @@ def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
     origin = curve.breaks[piece]
     begins = np.maximum(origin, start[interval])
     ends = np.minimum(curve.breaks[piece + 1], end[interval])
-    return _Windows(piece, origin, curve.lengths[piece], begins, ends, first, interval)
+    length = curve.breaks[piece + 1] - origin
+    return _Windows(piece, origin, length, begins, ends, first, interval)
 
 
 def _surveyed(

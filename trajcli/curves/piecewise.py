@@ -17,6 +17,7 @@ from trajcli.frozen import frozen
 Array = NDArray[np.float64]
 Side = Literal["left", "right"]
 
+ALL = slice(None)
 _BLOCK = 4096  # rows evaluated at a time: their monomials and results stay in the processor's cache
 _ROWS = 16 * _BLOCK  # rows on a curve of more pieces than that: their table is made for so many at a time
 _BORDER_UNITS = 4.0  # in the last place: a time so near to the border is on it, at any magnitude
@@ -58,7 +59,11 @@ class PiecewisePolynomial:
                 "expected (pieces + 1,) and (degree + 1, pieces, n)"
             )
         rising = breaks.size == 2 or bool((breaks[1:] > breaks[:-1]).all())
-        if not (isfinite(breaks[0]) and isfinite(breaks[-1]) and np.isfinite(coefficients).all()):
+        if not (
+            isfinite(breaks[0])
+            and isfinite(breaks[-1])
+            and all(np.isfinite(power).all() for power in coefficients)
+        ):
             raise ValueError("breaks and coefficients must be finite")
         if not rising or breaks[-1] < breaks[0]:
             if not np.isfinite(breaks).all():
@@ -110,14 +115,14 @@ class PiecewisePolynomial:
         """Return the curve's derivative; of an order above the degree it is zero, of degree 0."""
         return PiecewisePolynomial(self.breaks, derivative_coefficients(self.coefficients, order))
 
-    def piece_ends(self, order: int = 0) -> tuple[Array, Array]:
-        """Return the derivative of each piece at its own two ends, as two arrays of shape (pieces, n).
+    def piece_ends(self, order: int = 0, pieces: slice = ALL) -> tuple[Array, Array]:
+        """Return the derivative of pieces at their own two ends, as two arrays of shape (pieces, n).
 
         The second array up to the last row and the first array from the second row on are the two sides
-        of the inner breaks.
+        of the breaks between them.
         """
-        coefficients = derivative_coefficients(self.coefficients, order)
-        return coefficients[-1], horner(coefficients, self.lengths[:, None])
+        coefficients = derivative_coefficients(self.coefficients[:, pieces], order)
+        return coefficients[-1], horner(coefficients, self.lengths[pieces, None])
 
     def evaluate(self, t: ArrayLike, order: int = 0, *, side: Side = "right") -> Array:
         """Return the derivative of the given order at `t`, shape (*t.shape, n).

@@ -104,15 +104,15 @@ def allowed_at_end(trajectory: Trajectory, times: Array, targets: Array) -> Arra
     return tolerance
 
 
-def waypoint_tolerance(trajectory: Trajectory, times: Array, points: Array) -> Array:
+def waypoint_tolerance(trajectory: Trajectory, times: Array, largest: Array) -> Array:
     """Return the distance from waypoints that rounding explains, shape (m, n).
 
     Args:
         trajectory: The one that passes them.
         times: When, s on the trajectory, shape (m,); rounded as breaks are.
-        points: Where, shape (m, n).
+        largest: Absolute value of each joint at any of them, shape (n,).
     """
     speed = np.abs(trajectory.curve.evaluate(times, 1))
     late = JUMP_BREAK_UNITS * np.spacing(np.abs(times))[:, None] * speed
-    tolerance: Array = WAYPOINT_ABSOLUTE + WAYPOINT_RELATIVE * np.abs(points).max(axis=0) + late
+    tolerance: Array = WAYPOINT_ABSOLUTE + WAYPOINT_RELATIVE * largest + late
     return tolerance

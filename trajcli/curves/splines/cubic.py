@@ -20,7 +20,7 @@ Source: de Boor, A Practical Guide to Splines, revised edition (2001), chapter I
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +29,9 @@ from trajcli.curves.linear_systems import solve_tridiagonal
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.slopes import Waypoints
 from trajcli.frozen import frozen
+
+_VALUES = 1 << 19  # of points and components that are solved together: what that takes is some 80 MB
+_ROWS = 1 << 15  # pieces that are made together
 
 
 def natural(
@@ -104,13 +107,20 @@ def cubics(times: Array, positions: Array, velocities: Array, acceleration: Arra
         acceleration: At each knot, shape (m, n).
     """
     coefficients = np.empty((4, *positions.shape))
+    _fill(coefficients, np.diff(times), positions, velocities, acceleration)
+    coefficients.flags.writeable = False  # the curve takes it without a copy
+    return PiecewisePolynomial(times, coefficients)
+
+
+def _fill(
+    coefficients: Array, lengths: Array, positions: Array, velocities: Array, acceleration: Array
+) -> None:
+    """Write the pieces that start in given states into `coefficients` (4, pieces, n)."""
     np.subtract(acceleration[1:], acceleration[:-1], out=coefficients[0])
-    coefficients[0] /= np.diff(times)[:, None]
+    coefficients[0] /= lengths[:, None]
     coefficients[0] /= 6
     np.divide(acceleration[:-1], 2, out=coefficients[1])
     coefficients[2], coefficients[3] = velocities, positions
-    coefficients.flags.writeable = False  # the curve takes it without a copy
-    return PiecewisePolynomial(times, coefficients)
 
 
 @frozen
@@ -189,6 +199,55 @@ def _velocity(points: Waypoints, velocity: ArrayLike | None, name: str) -> Array
 
 def _curve(points: Waypoints, outer: tuple[Array | None, Array | None], end: _End) -> PiecewisePolynomial:
     """Return the spline with the given velocities at its ends, and `end` where there is none."""
+    coefficients = np.empty((4, points.count - 1, points.positions.shape[1]))
+    last = _solve(coefficients[1], points, outer, end)
+    _make_pieces(coefficients, points, last, outer[0])
+    coefficients.flags.writeable = False  # the curve takes it without a copy
+    return PiecewisePolynomial(points.times, coefficients)
+
+
+def _solve(
+    acceleration: Array, points: Waypoints, outer: tuple[Array | None, Array | None], end: _End
+) -> Array:
+    """Write the acceleration at all knots but the last, (m - 1, n), and return that of the last, (n,)."""
+    last: Array = np.empty(points.positions.shape[1])
+    for columns in _columns(*points.positions.shape):
+        part = Waypoints(points.times, points.positions[:, columns])
+        velocities = [None if velocity is None else velocity[columns] for velocity in outer]
+        solved = _accelerations(part, velocities, end)
+        acceleration[:, columns], last[columns] = solved[:-1], solved[-1]
+    return last
+
+
+def _make_pieces(coefficients: Array, points: Waypoints, last: Array, first: Array | None) -> None:
+    """Write the pieces between the knots into `coefficients` (4, m - 1, n), some after the others.
+
+    Args:
+        coefficients: In its second row stand the accelerations at the knots.
+        points: The knots.
+        last: Acceleration at the last one, shape (n,).
+        first: Velocity at the first one, shape (n,), where it is given.
+    """
+    for row in range(0, points.count - 1, _ROWS):
+        knots, pieces = slice(row, row + _ROWS + 1), slice(row, row + _ROWS)
+        acceleration = coefficients[1, knots].copy()
+        if row + _ROWS >= points.count - 1:
+            acceleration = np.concatenate([acceleration, last[None]])
+        part = Waypoints(points.times[knots], points.positions[knots])
+        starting = starting_velocities(part, acceleration)
+        if row == 0 and first is not None:
+            starting[0] = first
+        _fill(coefficients[:, pieces], part.lengths, part.positions[:-1], starting, acceleration)
+
+
+def _columns(count: int, components: int) -> list[slice]:
+    """Return the components that are solved together, so that memory hardly grows with their number."""
+    width = max(1, _VALUES // count)
+    return [slice(k, k + width) for k in range(0, components, width)]
+
+
+def _accelerations(points: Waypoints, outer: Sequence[Array | None], end: _End) -> Array:
+    """Return the acceleration at each knot, shape (m, n), with the given velocities at the ends, or `end`."""
     before, after = knot_equations(points)
     lengths = points.lengths
     views = (before, after, lengths), (after.backwards(), before.backwards(), lengths[::-1])
@@ -202,10 +261,7 @@ def _curve(points: Waypoints, outer: tuple[Array | None, Array | None], end: _En
         for view, velocity, order in zip(views, outer, (1, -1), strict=True):
             if velocity is None:
                 acceleration[::order][0] = _beyond(*view, acceleration[::order])
-    starting = starting_velocities(points, acceleration)
-    if outer[0] is not None:
-        starting[0] = outer[0]
-    return cubics(points.times, points.positions[:-1], starting, acceleration)
+    return acceleration
 
 
 def _natural_end(outer: KnotEquations, inner: KnotEquations, _lengths: Array) -> None:

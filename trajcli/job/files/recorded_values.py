@@ -86,12 +86,15 @@ def joint_columns(table: Table, robot: Robot) -> Array:
     Raises:
         InputError: When a joint has no column or two, one of another unit, or a value that no robot has.
     """
-    positions = np.stack([_joint(table, robot, joint) for joint in range(len(robot.joints))], axis=1)
-    if np.abs(positions).max(initial=0.0) > LARGEST_POSITION:
+    positions = np.empty((len(table.columns), len(robot.joints)))
+    for joint in range(len(robot.joints)):
+        positions[:, joint] = _joint(table, robot, joint)
+    if max(positions.max(initial=0.0), -positions.min(initial=0.0)) > LARGEST_POSITION:
         most = f"{LARGEST_POSITION:g} rad or m"
         raise InputError(
             f"{table.file}: a value is larger than {most}", hint="check its exponent and its unit"
         )
+    positions.flags.writeable = False  # who keeps it takes it without a copy
     return positions
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from trajcli.columns import Group, joint_factors
 from trajcli.curves.extrema import piece_extremes
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.findings import Collector, Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.grids import AT_BREAK, NANOSECOND, Grid, KnotGrid, ListedGrid, UniformGrid
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from trajcli.judge.recorded_tool import ToolJudge
 
 _ROWS = 65536  # whose times are looked at together
+_PIECES = 8192  # whose ends are looked at together
 _JUDGED = 1024  # intervals that are judged together
 _DEGREES = {"linear": 1, "cubic": 3, "quintic": 5}
 _SPACING = 4.0  # units in the last place of a length
@@ -252,12 +253,10 @@ class JoinedRows:
         breaks, count = self.plan.trajectory.curve.breaks, grid.count
         other = np.flatnonzero(self._others(degree))
         begins, ends = np.append(breaks, breaks[other]), np.append(breaks, breaks[other + 1])
-        first = np.clip(np.floor(begins * grid.rate) - 2, 0, count - 1) // _ROWS
-        last = np.clip(np.floor(ends * grid.rate) + 3, 0, count - 1) // _ROWS
-        done = -1
-        for k in np.argsort(first, kind="stable").tolist():
-            yield from range(max(int(first[k]), done + 1), int(last[k]) + 1)
-            done = max(done, int(last[k]))
+        first = np.clip(np.floor(begins * grid.rate) - 2, 0, count - 1).astype(np.intp) // _ROWS
+        last = np.clip(np.floor(ends * grid.rate) + 3, 0, count - 1).astype(np.intp) // _ROWS
+        opened, closed = (np.bincount(each, minlength=(count - 1) // _ROWS + 1) for each in (first, last))
+        yield from np.flatnonzero(np.cumsum(opened) - np.cumsum(closed) + closed).tolist()
 
     def _unproven(self, times: Array, degree: int) -> NDArray[np.int64]:
         """Return the intervals in which the curve is not what their rows determine, rising indices."""
@@ -322,10 +321,7 @@ class JoinedRows:
         steps = [np.zeros(curve.pieces + 1, dtype=bool)]
         short = np.flatnonzero(curve.lengths <= NANOSECOND)  # what they do between two rows is a step there
         for order in (1, 2):
-            first, last = curve.piece_ends(order)
-            room = _CONTINUOUS * np.maximum(np.abs(first), np.abs(last)).max(axis=0)
-            here = np.zeros_like(steps[0])
-            here[1:-1] = (np.abs(first[1:] - last[:-1]) > room).any(axis=1)
+            here = _stepping(curve, order)
             here[short] = here[short + 1] = True
             steps.append(steps[-1] | here)
         return tuple(steps)
@@ -404,6 +400,19 @@ class _Collectors:
         """Yield what was found."""
         for collector in (self._all, *(one for _, one in self._of_robots.values())):
             yield from collector.findings()
+
+
+def _stepping(curve: PiecewisePolynomial, order: int) -> NDArray[np.bool_]:
+    """Return at which breaks a derivative steps by more than rounding, shape (pieces + 1,)."""
+    blocks = [slice(k, k + _PIECES + 1) for k in range(0, curve.pieces, _PIECES)]
+    room = _CONTINUOUS * np.max(
+        [np.abs(ends).max(axis=0) for block in blocks for ends in curve.piece_ends(order, block)], axis=0
+    )
+    steps = np.zeros(curve.pieces + 1, dtype=bool)
+    for block in blocks:
+        first, last = curve.piece_ends(order, block)
+        steps[block.start + 1 : block.start + len(first)] = (np.abs(first[1:] - last[:-1]) > room).any(axis=1)
+    return steps
 
 
 def _shares(

@@ -256,10 +256,8 @@ class ThroughPoints(PointSequence):
         raise PlanningError(Problem(message, hint, amounts={"joint": robot.joint_names[joint], **amounts}))
 
     def _stacked(self, start: State, recorded: Recorded | None) -> PointTable:
-        listed = self.listed
-        rows = [start.position] if recorded is None else [start.position, *recorded.positions]
-        before = len(rows)
-        positions = np.array([*rows, *(point.as_state().position for point in listed)])
+        listed, positions = self.listed, self._positions(start.position, recorded)
+        before = len(positions) - len(listed)
         rates, given = np.zeros((2, *positions.shape)), np.zeros((2, len(positions)), dtype=bool)
         rates[:, 0], given[:, 0] = (start.velocity, start.acceleration), True
         blends = np.zeros(len(positions))
@@ -270,15 +268,24 @@ class ThroughPoints(PointSequence):
             blends[k] = point.blend or 0.0
         return PointTable(positions, self._times(recorded), rates, given, blends)
 
+    def _positions(self, here: Array, kept: Recorded | None) -> Array:
+        """Return all points, shape (m, n); where they are a whole recording, the array of that itself."""
+        rows = [here, *(point.as_state().position for point in self.listed)]
+        if kept is None or not isinstance(self.through, Recorded):
+            return np.array(rows)
+        whole = self.through.positions
+        if not self.listed and len(kept.positions) == len(whole) - 1 and bool((whole[0] == here).all()):
+            return whole
+        return np.concatenate([rows[:1], kept.positions, *([rows[1:]] if rows[1:] else ())])
+
     def _times(self, recorded: Recorded | None) -> Array | None:
         if not self.timed:
             return None
         listed = [point.time or self.duration or 0.0 for point in self.listed]
-        times = None if recorded is None else recorded.times
-        before: list[float] = [] if times is None else times.tolist()
-        if before and before[-1] > 0 and self.to is None and self.duration:
-            before = [time * (self.duration / before[-1]) for time in before]
-        times = np.array([0.0, *before, *listed])
+        before = np.empty(0) if recorded is None or recorded.times is None else recorded.times
+        if before.size and before[-1] > 0 and self.to is None and self.duration:
+            before = before * (self.duration / before[-1])
+        times = np.concatenate([[0.0], before, listed])
         late = np.flatnonzero(np.diff(times) <= 0)
         if late.size:
             message = (
@@ -286,6 +293,7 @@ class ThroughPoints(PointSequence):
                 f"the last recorded point after {times[-2]:.12g} s"
             )
             raise PlanningError(message, hint="give the target a later `time`")
+        times.flags.writeable = False  # curves and promises take them without a copy
         return times
 
 
@@ -298,7 +306,9 @@ def _placed(point: Waypoint, resolved: Target) -> Waypoint:
 
 def via_points(points: PointTable, times: Array) -> ViaPoints:
     """Return the promise to be in every point at its time (m,)."""
-    return ViaPoints(times, points.positions, np.zeros_like(points.positions))
+    exact = np.zeros(points.positions.shape)  # takes no memory, as long as nobody writes to it
+    exact.flags.writeable = False
+    return ViaPoints(times, points.positions, exact)
 
 
 def _at_times(points: tuple[Waypoint, ...] | Recorded, factor: float) -> tuple[Waypoint, ...] | Recorded:
