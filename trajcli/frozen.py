@@ -22,6 +22,8 @@ def frozen(cls: type[C]) -> type[C]:
     made = dataclass(init=False, repr=False, eq=False)(cls)
     for method in (__init__, __setattr__, __delattr__):
         setattr(made, method.__name__, method)
+    if hasattr(made, "__post_init__"):
+        made.__init__ = _checked  # type: ignore[method-assign]
     if made.__repr__ is object.__repr__:
         made.__repr__ = __repr__  # type: ignore[method-assign]
     return made
@@ -41,8 +43,12 @@ def __init__(self: Any, *values: Any, **named: Any) -> None:  # noqa: ANN401, N8
     if named or len(values) != len(names):
         values = _completed(type(self), names, values, named)
     self.__dict__.update(zip(names, values))  # noqa: B905  as many: said above
-    if hasattr(self, "__post_init__"):
-        self.__post_init__()
+
+
+def _checked(self: Any, *values: Any, **named: Any) -> None:  # noqa: ANN401
+    """Take the values, then check them."""
+    __init__(self, *values, **named)
+    self.__post_init__()
 
 
 def _completed(

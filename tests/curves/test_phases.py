@@ -62,7 +62,8 @@ def test_polish_lands_what_a_small_error_misses(seed, order, fixed):
     missing = replace(chain, durations=tuple(durations.tolist()))
     duration = chain.duration if fixed else None
     assert missing.defect() > 1e-11
-    landed = missing.polished(duration)
+    landed, miss = missing.polished(duration)
+    assert miss == landed.defect(duration)
     end = integrate(landed.initial, landed.durations, landed.constants)
     assert np.abs(end - chain.final).max() <= 2e-13 * max(1.0, landed.duration) ** order
     if fixed:
@@ -74,8 +75,8 @@ def test_polish_of_given_duration_changes_constants_where_phases_are_too_few():
     chain = chain_of(
         np.zeros(3), np.array([2.0, 0.0, 0.0]), np.array([1.0, 2.0, 1.0]), np.array([1.0, -1.0, 1.0])
     )
-    landed = chain.polished(4 * (1 + 1e-9))
-    assert landed.defect(4 * (1 + 1e-9)) < 1e-14
+    landed, miss = chain.polished(4 * (1 + 1e-9))
+    assert miss == landed.defect(4 * (1 + 1e-9)) < 1e-14
     assert landed.duration == pytest.approx(4 * (1 + 1e-9), rel=1e-15)
     np.testing.assert_allclose(np.abs(landed.constants), 1 - 3e-9, atol=1e-12)
 
@@ -98,7 +99,7 @@ def test_rounded_breaks_raise_no_constant():
     for cruise in np.linspace(4000.0, 4100.0, 20) + 0.123:
         durations = np.array([3.3e-5, 1.7e-5, 3.3e-5, cruise, 3.3e-5, 1.7e-5, 3.3e-5])
         final = integrate(np.zeros(3), durations, constants)
-        chain = chain_of(np.zeros(3), final, durations, constants).with_cruises().polished()
+        chain = chain_of(np.zeros(3), final, durations, constants).with_cruises().polished()[0]
         curve = chain.curve(0.0, chain.duration)
         assert np.abs(curve.piece_ends(3)).max() <= 7.0 * (1 + 1e-12)
         assert curve.piece_ends()[1][-1, 0] == pytest.approx(final[0], rel=1e-15)

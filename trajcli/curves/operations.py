@@ -56,7 +56,7 @@ def merge_pieces(breaks: Sequence[Array], coefficients: Array) -> PiecewisePolyn
     counts = np.array([each.size - 1 for each in breaks])
     times = np.concatenate([each[1:-1] for each in breaks])
     owners = np.repeat(np.arange(len(breaks)), counts - 1)
-    order = np.lexsort((owners, times))
+    order = np.argsort(times, kind="stable")  # of equal times that of the first curve comes first
     times, owners = times[order], owners[order]
     united, index_of = _united(times, owners, _ROUNDING * max(abs(start), abs(end)))
     merged = np.concatenate([[start], united, [end]])
@@ -71,7 +71,7 @@ def merge_pieces(breaks: Sequence[Array], coefficients: Array) -> PiecewisePolyn
 
 def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.ndarray]:
     """Return the times that are kept, and for each of `times` (sorted) the index of its representative."""
-    if not (np.diff(times) <= apart).any():
+    if not (times[1:] - times[:-1] <= apart).any():
         return times, np.arange(times.size)
     kept: list[float] = []
     index_of = np.empty(times.size, dtype=np.intp)

@@ -74,14 +74,15 @@ class PhaseChain:
     def _seen(self) -> _Seen:
         """What the phases do, seen once."""
         states, leftover, driving = self._walk_of_third_order() if self.order == _ORDER else self._walk()
-        columns = zip(zip(*states, strict=True), self.final, strict=True)
-        peaks = [max(*values, -min(values), to, -to) for values, to in columns]  # NaN is larger than nothing
+        columns, final = zip(*states, strict=True), self.final
+        # NaN is larger than nothing
+        peaks = [max(*each, -min(each), to, -to) for each, to in zip(columns, final, strict=True)]
         duration, sizes = _total(self.durations), [*peaks]
         if len(sizes) > 1:
             sizes[0] = max(sizes[0], sizes[1] * duration)
         if len(sizes) > 2:
             sizes[1] = max(sizes[1], sizes[2] * math.fsum(driving))
-        missed = [value - wanted for value, wanted in zip(states[-1], self.final, strict=True)]
+        missed = [value - wanted for value, wanted in zip(states[-1], final, strict=True)]
         return _Seen(states, leftover, tuple(peaks), duration, [size or 1.0 for size in sizes], missed)
 
     def _walk(self) -> _Walk:
@@ -174,17 +175,20 @@ class PhaseChain:
         slower = factor**self.order
         return self._with([time * factor for time in self.durations], [c / slower for c in self.constants])
 
-    def polished(self, duration: float | None = None) -> PhaseChain:
-        """Return the motion whose end is its target to rounding, if the phases allow it; see `defect`.
+    def polished(self, duration: float | None = None) -> tuple[PhaseChain, float]:
+        """Return the motion whose end is its target to rounding, if the phases allow it, and its `defect`.
 
         Args:
             duration: Kept exactly if given; else the duration is free.
         """
         best = self.corrected(1.0, 0.0, duration)
-        if duration is not None and best.defect(duration) > 10 * _GOAL:
+        miss = best.defect(duration)
+        if duration is not None and miss > 10 * _GOAL:
             other = self.corrected(1.0, _RELUCTANCE, duration)
-            best = min(best, other, key=lambda chain: chain.defect(duration))
-        return best
+            less = other.defect(duration)
+            if less < miss:
+                return other, less
+        return best, miss
 
     def curve(self, position: float, duration: float) -> PiecewisePolynomial:
         """Return the motion from `position` as a curve (n = 1) over [0, `duration`]."""
@@ -322,8 +326,14 @@ def _total(values: Sequence[float]) -> float:
 
 def _largest(values: Sequence[float]) -> float:
     """Return the largest magnitude; NaN where there is one, 0 where there is none."""
-    largest = max(map(abs, values), default=0.0)
-    return math.nan if any(value != value for value in values) else largest
+    largest = 0.0
+    for value in values:
+        size = abs(value)
+        if size > largest:
+            largest = size
+        elif value != value:
+            return math.nan
+    return largest
 
 
 def _rounded_breaks(durations: Sequence[float], end: float) -> list[float]:

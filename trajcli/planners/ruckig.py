@@ -363,11 +363,11 @@ def _steady(problem: BoundaryProblem, duration: float) -> PhaseProfile:
 def _corrected(answer: PhaseProfile, duration: float | None) -> tuple[PhaseProfile, float]:
     """Return the motion corrected to end in its target, and by how much it still misses it."""
     if duration is None or answer.duration > duration * (1 + 1e-12):
-        free = answer.chain.polished()
+        free, miss = answer.chain.polished()
         if duration is None or free.duration > duration:
-            return PhaseProfile(answer.position, free, free.duration, answer.braking), free.defect()
-    kept = answer.chain.polished(duration)
-    return PhaseProfile(answer.position, kept, duration, answer.braking), kept.defect(duration)
+            return PhaseProfile(answer.position, free, free.duration, answer.braking), miss
+    kept, miss = answer.chain.polished(duration)
+    return PhaseProfile(answer.position, kept, duration, answer.braking), miss
 
 
 def _attempts(
