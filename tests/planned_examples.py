@@ -31,5 +31,5 @@ def planned_once(loaded: LoadedJob, carried: Carried | None = None, *, advise: b
 
 def share_plans(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the commands of a test share plans, where it is about what they make of a plan."""
-    for module in ("trajcli.cli.plan", "trajcli.output.delivery.delivered"):
+    for module in ("trajcli.cli.plan", "trajcli.output.delivery.delivered", "trajcli.planning.plan"):
         monkeypatch.setattr(f"{module}.plan_job", planned_once)

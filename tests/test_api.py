@@ -251,6 +251,7 @@ def test_an_arm_answers_questions() -> None:
     assert robot.ik(far) == ()
 
 
+@pytest.mark.full
 def test_the_page_runs_as_it_stands(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     page = (ROOT / "docs/python.md").read_text(encoding="utf-8")
     (tmp_path / "examples").symlink_to(EXAMPLES)

@@ -43,6 +43,7 @@ def test_there_is_one_golden_file_for_each_example() -> None:
     assert {golden_file(path) for path in PATHS} == set(GOLDEN.glob("*.csv"))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("example", EACH)
 def test_rows_are_the_golden_ones(example: Path, tmp_path: Path) -> None:
     now = tmp_path / "now.csv"
@@ -57,6 +58,7 @@ def test_rows_are_the_golden_ones(example: Path, tmp_path: Path) -> None:
     assert now.read_bytes() == golden.read_bytes()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("example", EACH)
 def test_every_example_verifies_and_reports(example: Path) -> None:
     assert report_of(planned_example(example.stem)).verdict == "verified"

@@ -84,6 +84,7 @@ def test_jerk_limited_motion_at_odd_times_is_reproduced(seed: int) -> None:
     assert (largest_differences(trajectory, knots) <= [1e-9, 1e-8, 1e-6]).all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", few(ROUGH + SMOOTH))
 def test_every_trajectory_is_reproduced_within_the_stated_deviation(name: str) -> None:
     trajectory = trajectory_of(name)
@@ -96,6 +97,7 @@ def test_every_trajectory_is_reproduced_within_the_stated_deviation(name: str) -
         assert position >= 0.9 * knots.deviation.position - 1e-13  # nothing is claimed to be worse than it is
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", few(ROUGH + SMOOTH))
 def test_a_controller_takes_the_times_and_the_end(name: str) -> None:
     trajectory = trajectory_of(name)

@@ -118,6 +118,7 @@ def test_the_quaternion_goes_on_through_whole_turns_and_across_blocks():
         assert rows[-1, 4] == pytest.approx(-1)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("size", [1, 13, 4096])
 def test_no_size_of_blocks_changes_a_sign(size):
     arm = ARMS[2]

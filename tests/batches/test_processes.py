@@ -109,6 +109,7 @@ def test_a_process_without_memory_is_replaced() -> None:
     assert found["a"].inputs == found["memory"].inputs != found["b"].inputs
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["endless", "stubborn"])
 def test_what_does_not_end_is_ended(name: str) -> None:
     begun = time.monotonic()

@@ -200,6 +200,7 @@ def test_what_a_search_through_zones_finds_is_no_bound(job: str) -> None:
     assert flown.bound is None
 
 
+@pytest.mark.full
 def test_neither_order_nor_number_of_processes_shows(job: str) -> None:
     sweep = swept(job, *VARIED)
     texts = {table_of(sweep).text("csv")}

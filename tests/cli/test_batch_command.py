@@ -52,6 +52,7 @@ def files(folder: str) -> set[str]:
     return {path.name for path in Path(folder).iterdir()}
 
 
+@pytest.mark.full
 def test_examples_are_written_as_plan_writes_them(tmp_path: Path, capfd: Capture) -> None:
     names = ["quintic", "ur5e_pick", "recorded", "moveit_limits", "gantry", "slow"]
     code, out, err = call(
@@ -83,6 +84,7 @@ def test_a_folder_beside_its_jobs_in_another_format(folder: Path, capfd: Capture
     assert json.loads(Path("jobs/a.jsonl").read_text().splitlines()[0])["q"] == [0]
 
 
+@pytest.mark.full
 def test_only_what_changed_is_planned(folder: Path, capfd: Capture) -> None:
     write(a=JOB, b=OF_FILE, c=OF_FILE.replace("arm", "other"))
     for name in ("arm", "other"):

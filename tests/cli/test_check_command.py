@@ -104,6 +104,7 @@ def test_what_plan_writes_is_satisfied(capfd: pytest.CaptureFixture[str], planne
         assert judgement["period"] == 0.002
 
 
+@pytest.mark.full
 def test_standard_input_is_a_file(planned: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rows = (planned / "rows.csv").read_text()
     done = call(capfd, "check", "-", "--job", planned / "job.yaml", "--format", "json", stdin=rows)
@@ -124,6 +125,7 @@ def changed(planned: Path, tmp_path: Path, **columns: Any) -> Path:
     return path
 
 
+@pytest.mark.full
 def test_a_tool_beside_its_line_is_found(
     capfd: pytest.CaptureFixture[str], planned: Path, tmp_path: Path
 ) -> None:
@@ -146,6 +148,7 @@ def test_a_tool_beside_its_line_is_found(
     assert beside["value"] == pytest.approx(np.linalg.norm(apart, axis=1).max(), rel=1e-4)
 
 
+@pytest.mark.full
 def test_the_limits_of_a_move_hold_in_it_alone(
     capfd: pytest.CaptureFixture[str], planned: Path, tmp_path: Path
 ) -> None:
@@ -158,6 +161,7 @@ def test_the_limits_of_a_move_hold_in_it_alone(
     assert found[0]["limit"] == pytest.approx(np.copysign(np.radians(5), found[0]["value"]))
 
 
+@pytest.mark.full
 def test_moves_without_a_column_are_known_by_the_times_of_the_plan(
     capfd: pytest.CaptureFixture[str], planned: Path, tmp_path: Path
 ) -> None:
@@ -172,6 +176,7 @@ def test_moves_without_a_column_are_known_by_the_times_of_the_plan(
     assert any("no column `move`" in note for note in view(capfd, half, "--job", tight)[1]["notes"])
 
 
+@pytest.mark.full
 def test_another_start_is_found(capfd: pytest.CaptureFixture[str], planned: Path, tmp_path: Path) -> None:
     job = tmp_path / "moved.yaml"
     job.write_text(JOB.replace("start: home", "start: {joints: [0.5, -90, 90, 0, 90, 0]}"))

@@ -24,6 +24,7 @@ def checked(capfd: pytest.CaptureFixture[str], job: str, file: Path) -> tuple[in
     return outcome.code, json.loads(outcome.out)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("ending", few(["csv", "mcap", "goal.yaml", "jsonl", "npy", "npz"], 2))
 def test_a_slower_motion_for_a_consumer_is_named_with_its_options(
     ending: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -46,6 +47,7 @@ def test_the_options_that_are_named_make_the_same_rows(
     assert again.read_bytes() == file.read_bytes()
 
 
+@pytest.mark.full
 def test_the_table_says_it_in_its_first_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rows.csv"
     planned(capfd, "sync.yaml", file, "--for", "ros-jtc")
@@ -88,6 +90,7 @@ def test_no_fault_is_taken_for_rows_of_a_consumer(
     assert "planned_with" not in found
 
 
+@pytest.mark.full
 def test_rows_with_other_ends_are_planned_for_nobody(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def test_a_closed_or_full_standard_output_is_4(folder: Path, words: str, stream:
     assert done.stderr == f"error: cannot write standard output: {reason}\n"
 
 
+@pytest.mark.full
 def test_rows_in_a_file_need_no_stream(folder: Path, rows: str) -> None:
     done = shell("trajcli plan job.yaml -o a.csv <&- >&- 2>&-", folder)
     assert done.returncode == 0

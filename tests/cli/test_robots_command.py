@@ -29,6 +29,7 @@ def of_table(row):
     return {key: row[key] for key in keys}
 
 
+@pytest.mark.full
 def test_the_index_says_what_the_files_say(told_of_files):
     index = json.loads(catalogue_list.INDEX.read_bytes())
     assert index["files"] == catalogue_list.checksum(), "run `make docs`"
@@ -70,6 +71,7 @@ def test_the_list(arms):
     assert kinds["rpr"] == (3, "RPR")
 
 
+@pytest.mark.full
 def test_the_list_says_the_units_of_each_file(arms):
     out = arms.call("robots").out
     head, *lines = out.splitlines()
@@ -96,6 +98,7 @@ CHOSEN = [  # by hand from docs/robots.md
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("words", "names"), few(CHOSEN, 4), ids=[" ".join(map(str, row[0])) for row in few(CHOSEN, 4)]
 )
@@ -106,6 +109,7 @@ def test_chosen_robots(arms, words, names):
     assert ("no robot of the catalogue" in err) == (not names)
 
 
+@pytest.mark.full
 def test_the_list_says_where_robots_come_from(arms):
     told = {row["name"]: row for row in arms.json("robots")}
     assert (told["ur5e"]["maker"], told["ur5e"]["origin"]) == ("Universal Robots", "real")

@@ -31,6 +31,7 @@ def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path("job.yaml")
 
 
+@pytest.mark.full
 def test_the_table_goes_to_standard_output(job: Path, capfd: Capture) -> None:
     code, out, err = call(capfd, "sweep", job, *VARY, "-j", "1")
     assert (code, out) == (0, TABLE)

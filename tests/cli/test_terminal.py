@@ -130,6 +130,7 @@ def test_the_tightest_limit_is_the_largest_of_the_report(name: str) -> None:
         assert [(each.quantity, round(each.used, 6)) for each in of_tool] == [("speed", 1.0)] * 2
 
 
+@pytest.mark.full
 def test_moves_have_one_title_and_one_count(capfd: pytest.CaptureFixture[str]) -> None:
     """What is attached and detached between the moves is no move, and takes no number from them."""
     from trajcli.player.scene import scene_of_plan

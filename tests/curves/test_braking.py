@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.curves.braking import braking
 
@@ -44,7 +45,7 @@ def _ruckig(velocity, acceleration, bounds):
     return times, rows[:, 1], rows[:, 2]
 
 
-@pytest.mark.parametrize("seed", range(150))
+@pytest.mark.parametrize("seed", few(range(150)))
 def test_times_inside_are_those_of_ruckigs_braking(seed):
     velocity, acceleration, bounds = _problem(seed)
     known = braking(velocity, acceleration, bounds)
@@ -56,7 +57,7 @@ def test_times_inside_are_those_of_ruckigs_braking(seed):
         assert farthest == pytest.approx(known.fastest, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", few(range(60)))
 def test_no_admissible_control_is_inside_sooner_for_good(seed):
     """Random jerks: whoever is within the velocity bound before, has to leave the bounds later."""
     velocity, acceleration, bounds = _problem(seed)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from heavy_arms import random_arm, random_payload
 from scipy.optimize import minimize_scalar
+from tiers import few
 
 from trajcli.curves import node_bound
 from trajcli.dynamics import effort_bound
@@ -62,7 +63,7 @@ def random_dynamics(rng, friction):
     return InverseDynamics(arm, rng.normal(size=3) * 9, random_payload(rng) if rng.random() < 0.5 else None)
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", few(range(30)))
 def test_bounds_are_never_below_samples_and_hardly_above(seed):
     require_sound_and_tight(seed)
 
@@ -93,7 +94,7 @@ def require_sound_and_tight(seed):
             assert peak.value <= peak.upper_bound
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", few(range(20)))
 def test_majorants_bound_taylor_coefficients_everywhere(seed):
     rng = np.random.default_rng(1000 + seed)
     dynamics = random_dynamics(rng, friction=False)
@@ -356,7 +357,7 @@ def test_a_fast_motion_may_keep_a_limit_that_gravity_alone_exceeds():
     assert needed_stretch(survey, 0, 1, 40.0, 1e-6).factor == 1.0
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", few(range(12)))
 def test_stretch_is_the_smallest(seed):
     rng = np.random.default_rng(300 + seed)
     dynamics = random_dynamics(rng, friction=seed % 2 == 0)

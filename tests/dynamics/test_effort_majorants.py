@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from heavy_arms import RIGHT, random_arm, random_payload
 from series_of_efforts import effort_series
+from tiers import few
 
 from trajcli.dynamics.effort_bound import effort_majorants
 from trajcli.dynamics.newton_euler import InverseDynamics
@@ -285,7 +286,7 @@ def test_each_term_is_in_the_bound_once(name):
         assert most <= term.at_most * true, k
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", few(range(12)))
 def test_arms_of_all_kinds_stay_within_their_bounds(seed):
     """Tilted axes, both conventions and signs, friction, a payload, moving pieces of any degree."""
     rng = np.random.default_rng(2000 + seed)

@@ -72,6 +72,7 @@ def test_a_longer_motion_is_said_to_be_longer(plan: Plan, source: EditedMotion, 
     assert (known, "they last" in why) == (False, True)
 
 
+@pytest.mark.full
 def test_fewer_rows_are_rows_of_the_plan(plan: Plan, source: EditedMotion, tmp_path: Path) -> None:
     assert said(plan, resample(source, 50.0), tmp_path) == (True, "")
     known, why = said(plan, resample(source, 300.0), tmp_path)  # between the rows, as they are joined

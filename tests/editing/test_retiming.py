@@ -198,6 +198,7 @@ def test_a_file_without_moves_has_none_to_retime(tmp_path: Path) -> None:
         retime(motion, kept.requirements, per_move=True)
 
 
+@pytest.mark.full
 def test_rows_with_nine_decimals_verify_as_they_are_written(tmp_path: Path) -> None:
     """Numbers that are rounded twice must not disagree: by 37 factors, faster and slower."""
     job = JOB.replace("qddd, move", "move").replace("rate: 100", "rate: 1000")

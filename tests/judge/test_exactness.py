@@ -7,6 +7,7 @@ import pytest
 from recorded_rows import judged
 from scipy.interpolate import BPoly, PPoly
 from scipy.optimize import minimize_scalar
+from tiers import few
 
 from trajcli.kinematics.robot import Limits
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
@@ -61,7 +62,7 @@ def tight(extremes: np.ndarray, share: np.ndarray) -> Limits:
     return Limits(*rows)
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", few(range(60)))
 def test_the_judgement_is_that_of_dense_samples(seed: int) -> None:
     """Never less severe, and at most 1e-9 more."""
     rng = np.random.default_rng(seed)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.editing.edited_motion import ReadingOptions, read_motion
 from trajcli.editing.kept_limits import kept_limits
@@ -56,13 +57,16 @@ def judged(folder: Path, columns: str, change: tuple[str, str] = ("", "")) -> Ju
 
 @pytest.mark.parametrize(
     "columns",
-    [
-        "t, q, qd, qdd, pose, twist, twistd",
-        "t, q, twist, twistd",
-        "t, q, qd, pose, path, move",
-        "t, pose",
-        "t, pose, twist, twistd",
-    ],
+    few(
+        [
+            "t, q, qd, qdd, pose, twist, twistd",
+            "t, q, twist, twistd",
+            "t, q, qd, pose, path, move",
+            "t, pose",
+            "t, pose, twist, twistd",
+        ],
+        2,
+    ),
 )
 def test_rows_of_the_plan_are_accepted(tmp_path: Path, columns: str) -> None:
     judgement = judged(tmp_path, columns)

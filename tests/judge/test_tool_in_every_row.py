@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 from line_of_ur5e import plan
+from tiers import few
 
 import trajcli
 from trajcli.columns import parse_column
@@ -449,7 +450,7 @@ def test_rounding_of_a_turn_counts_three_times_in_the_jerk_of_the_tool(side: flo
 
 
 @SIDES
-@pytest.mark.parametrize(("key", "power"), [("speed", 1), ("acceleration", 2), ("jerk", 3)])
+@pytest.mark.parametrize(("key", "power"), few([("speed", 1), ("acceleration", 2), ("jerk", 3)], 3))
 def test_rounding_of_a_slide_that_is_swung_counts_with_its_length(key: str, power: int, side: float) -> None:
     """A beam that turns 100 times a second or so, and a slide along it, which is a rounding further out."""
     off, rate, t = 1e-4, 100.0, np.arange(3.0)

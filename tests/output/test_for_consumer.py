@@ -69,6 +69,7 @@ def test_rows_keep_all_limits_as_they_are_joined(name: str, profile: str, longes
         assert float(said[1]) == pytest.approx(100 * longer, rel=0.06)
 
 
+@pytest.mark.full
 def test_the_summary_says_what_the_joined_curve_uses() -> None:
     made = made_for("time_optimal", "ur-servoj")
     assert made.summary.startswith("for ur-servoj at 500 Hz: joined as it will be, ")
@@ -78,6 +79,7 @@ def test_the_summary_says_what_the_joined_curve_uses() -> None:
     assert float(said[1]) == pytest.approx(100 * share, rel=2e-3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["ur5e_pick", "time_optimal"])
 def test_no_smaller_uniform_stretch_does_it(name: str) -> None:
     """Scaled as a whole by ever more, the planned motion keeps its limits between rows no sooner."""
@@ -122,6 +124,7 @@ def test_moves_that_are_said_to_be_over_a_limit_between_rows_are() -> None:
     assert not any(map(moves.are_over, (1.3, 1.6)))
 
 
+@pytest.mark.full
 def test_python_and_batch_plan_for_a_consumer(tmp_path: Path) -> None:
     job = tmp_path / "job.yaml"
     job.write_text((EXAMPLES / "ur5e_pick.yaml").read_text() + "\nwhen_over_limit: slow\n")

@@ -97,6 +97,7 @@ def test_of_very_many_rows_only_those_about_breaks_are_looked_at(monkeypatch: py
         assert list(rows._unproven_blocks(grid, degree)) == sorted(chosen)
 
 
+@pytest.mark.full
 def test_a_named_cure_cures() -> None:
     plan = planned("ur5e_pick")
     rows = joined_rows(plan, grid_of(plan), FORMATS["csv"])
@@ -113,6 +114,7 @@ def test_a_named_cure_cures() -> None:
     assert report.worst.value / report.worst.limit == pytest.approx(factor_by_scipy(plan), rel=2e-3)
 
 
+@pytest.mark.full
 def test_the_columns_that_join_knots_to_the_motion_are_named() -> None:
     """By straight lines between knots it is far from planned: cubics, which blends are, keep all."""
     sets = ("output.rows=knots", "output.columns=[t, q]")

@@ -36,6 +36,7 @@ def missed(plan: Plan, motion: MotionFile) -> float:
     return float(np.abs(curve(times) - plan.trajectory.curve.evaluate(times)).max())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("ending", ["csv", "jsonl", "mcap", "yaml"])
 def test_rows_at_knots_are_the_curve_in_every_format(ending: str, tmp_path: Path) -> None:
     plan, file = (
@@ -48,6 +49,7 @@ def test_rows_at_knots_are_the_curve_in_every_format(ending: str, tmp_path: Path
     assert missed(plan, motion) < 1e-9
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("ending", ["csv", "jsonl", "mcap", "yaml"])
 def test_rows_of_a_rate_and_at_knots_hold_both(ending: str, tmp_path: Path) -> None:
     plan, file = planned("ur5e_pick", "output={rows: both, rate: 125}"), tmp_path / f"b.{ending}"
@@ -93,6 +95,7 @@ def knots_are_the_curve(seeds: range, folder: Path) -> int:
     return jobs
 
 
+@pytest.mark.full
 def test_knots_of_random_motions_are_their_curves(tmp_path: Path) -> None:
     assert knots_are_the_curve(range(10), tmp_path) >= 5
 
@@ -102,6 +105,7 @@ def test_knots_of_random_motions_at_length(tmp_path: Path) -> None:
     assert knots_are_the_curve(range(1000, 1400), tmp_path) >= 150
 
 
+@pytest.mark.full
 def test_batch_and_python_take_rows(tmp_path: Path) -> None:
     job = str(EXAMPLES / "ur5e_pick.yaml")
     (done,) = trajcli.batch([job], tmp_path, rows="knots", processes=1)

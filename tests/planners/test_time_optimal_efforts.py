@@ -122,6 +122,7 @@ def test_durations_against_toppra_on_many_splines(name):
         assert motion.trajectory.duration <= 1.003 * toppra_duration(robot, points)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("mass", [0.0, 5.0])
 def test_a_joint_is_at_its_limit_nearly_always(mass):
     robot = arm("ur5", mass=mass)
@@ -131,6 +132,7 @@ def test_a_joint_is_at_its_limit_nearly_always(mass):
     assert (used > 0.97).mean() > 0.9
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("friction", [Friction(5.0, 0.0), Friction(0.0, 8.0), Friction(3.0, 5.0)])
 def test_friction_is_kept(friction):
     robot = arm("ur5", velocity=3.0, friction=friction)

@@ -75,6 +75,7 @@ def kinds(planned):
     return [event.kind for event in planned.events]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "planner", ["trapezoid", "cubic", "quintic", "septic", "cycloidal", "jerk_limited", "spline", "blends"]
 )
@@ -96,6 +97,7 @@ def test_fastest_durations_respect_efforts(planner):
     assert "to keep the effort limit of" in " ".join(event.message for event in kept.events)
 
 
+@pytest.mark.full
 def test_each_move_is_judged_with_what_it_carries():
     there, back = ({"planner": "quintic", "to": {"joints": q}, "duration": 0.8} for q in RESTS[::-1])
     assert plan(job(there, back)).verdict.passed
@@ -165,6 +167,7 @@ def test_a_hanging_arm_feels_gravity_the_other_way():
     assert finding.limit == -60.0
 
 
+@pytest.mark.full
 def test_a_move_between_moving_states_is_slowed_within_efforts():
     given = lift(
         {"planner": "quintic", "to": {"joints": [1], "velocity": [1.0]}, "duration": 0.7},

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cli.running import call
+from planned_examples import share_plans
 
 from trajcli.grids import ListedGrid
 from trajcli.job.read import job_from_text
@@ -58,6 +59,7 @@ def lines() -> Plan:
     return plan
 
 
+@pytest.mark.full
 def test_columns_of_the_path_say_where_the_tool_is_on_it_and_stand_in_a_zone():
     plan = lines()
     (zone,) = plan.flyby.zones
@@ -96,7 +98,10 @@ def test_the_report_of_the_tool_is_that_of_its_path_between_zones():
         assert move.tool.method == "bounded"
 
 
-def test_rows_of_another_motion_are_compared_with_the_path_outside_of_zones(tmp_path: Path, capfd):
+def test_rows_of_another_motion_are_compared_with_the_path_outside_of_zones(
+    tmp_path: Path, capfd, monkeypatch
+):
+    share_plans(monkeypatch)
     job, rows = tmp_path / "job.yaml", tmp_path / "rows.csv"
     job.write_text(json.dumps(LINES))
     assert call(capfd, "plan", job, "-q", "-o", rows).code == 0
@@ -134,6 +139,7 @@ def test_a_joint_that_only_carries_rounding_bounds_nothing_and_one_on_its_limit_
     assert isinstance(fastest_duration(beyond, last, limits), LowerBound)
 
 
+@pytest.mark.full
 def test_a_joint_move_by_so_much_can_be_flown_by():
     """Where it ends is known from where the arm stands, as that of a move to joints."""
     to = [{"planner": "jerk_limited", "to": {"joints": joints}} for joints in ([0.9, 1.25], [1.0, 2.0])]

@@ -100,6 +100,7 @@ def test_a_corner_of_two_joint_moves_is_as_fast_as_the_fastest_known(zone, most,
     assert found * (1 - 1e-3) <= duration(zone=zone) <= most
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("zone", "most"), few([(0.02, 1.353), (0.05, 1.184)], 1))
 def test_a_corner_of_two_lines_of_the_tool_is_flown_by(zone, most):
     lines = [
@@ -163,6 +164,7 @@ def test_parts_of_paths_beside_zones_are_proven_to_be_on_their_paths():
     assert [(f.move, f.kind) for f in found] == [(move, "tool_path") for move in (1, 3, 5, 7)]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("zone", "saved"), [(1e-6, 5.31e-3), (1e-7, 2.46e-3), (1e-9, 0.528e-3)])
 def test_what_a_small_zone_saves_falls_with_the_cube_root_of_its_radius(zone, saved):
     plan = flown(zone=zone)
@@ -188,6 +190,7 @@ def test_the_way_back_takes_as_long():
     assert back == pytest.approx(duration(), rel=1e-4)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("k", [0.5, 3.0])
 def test_limits_times_powers_of_k_divide_the_time_by_k(k):
     faster = {"velocity": 3 * k, "acceleration": 8 * k**2, "jerk": 60 * k**3}
@@ -289,6 +292,7 @@ def test_without_limits_of_jerk_velocities_join():
     assert plan.trajectory.duration < duration()
 
 
+@pytest.mark.full
 def test_a_limit_of_the_tool_holds_in_its_zone_and_on_the_lines_beside_it():
     plan = flown(limits={**FAST, "tcp": {"speed": 0.3}})
     curve = plan.trajectory.curve
@@ -462,6 +466,7 @@ def test_a_time_optimal_move_is_flown_by_at_its_ends_and_passes_its_points():
     assert findings(plan, [plan.moves[0], changed, plan.moves[2]]) == {"waypoint"}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "second",
     few(
@@ -484,6 +489,7 @@ def test_arcs_and_screws_are_flown_by(second):
     assert plan.flyby.zones[0].farthest <= 0.02 * (1 + 1e-6)
 
 
+@pytest.mark.full
 def test_seven_joints_and_slides_are_flown_by():
     seven = [0.1, -0.6, 0.2, -2.0, 0.1, 1.6, 0.7]
     limits = {"velocity": 2, "acceleration": 8, "jerk": 100}

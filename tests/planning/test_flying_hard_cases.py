@@ -42,6 +42,7 @@ def place(q: np.ndarray) -> np.ndarray:
     ).T
 
 
+@pytest.mark.full
 def test_a_singular_corner_is_flown_by():
     """The arm is stretched in its corner, at 0.5 m, and changes its elbow there."""
     plan = planned(to(0.8, 0.0), to(1.2, -0.5))
@@ -54,6 +55,7 @@ def test_a_singular_corner_is_flown_by():
     assert plan.flyby.duration < 0.8 * plan.flyby.stopping
 
 
+@pytest.mark.full
 def test_a_corner_behind_which_another_branch_is_asked_for_is_refused_as_without_zones():
     line = {"planner": "line", "to": {"xyz": [0.3, 0.3, 0], "configuration": {"elbow": "down"}}, **FASTEST}
     for zone in (0.02, None):
@@ -61,6 +63,7 @@ def test_a_corner_behind_which_another_branch_is_asked_for_is_refused_as_without
             planned(to(0.8, -0.5), line, **({} if zone is None else {"zone": zone}))
 
 
+@pytest.mark.full
 def test_a_limit_that_binds_in_a_zone_alone_lowers_the_pace_of_the_zone_alone():
     """Along each line one joint turns the tool, by 8 rad/s^2 at most; in the zone both do, the one and the other way."""
     moves = to(0.9, 1.2), to(0.9, 0.5)

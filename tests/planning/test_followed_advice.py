@@ -92,6 +92,7 @@ def test_every_planner_is_here() -> None:
     assert set(SHORT) == set(PLANNERS)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("tag", few(sorted(SHORT), 5))
 def test_moves_that_are_too_fast(tag: str) -> None:
     assert follows_every(SHORT[tag])
@@ -115,6 +116,7 @@ def test_bounds_in_messages_are_given_back(move: Job) -> None:
             assert follows_every(job(move, robot=robot))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "law",
     few(
@@ -166,6 +168,7 @@ def test_two_findings_give_one_duration() -> None:
     )  # the peak of the jerk is 60 / T^3
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("tag", ["cubic", "quintic", "septic"])
 def test_the_factor_of_a_move_between_moving_states_passes(tag: str) -> None:
     start = {"joints": [0, 0.1], "velocity": [0.4, -0.2]}
@@ -319,6 +322,7 @@ def test_one_cause_is_one_error() -> None:
     assert sum("jerk" in (p.advice() or "") for p in errors) == 1
 
 
+@pytest.mark.full
 def test_the_time_of_an_error_in_a_later_move_counts_from_the_start_of_the_trajectory() -> None:
     """The same line is refused where the arm waits before it, later by as long as it waits."""
     robot = {
@@ -337,6 +341,7 @@ def test_the_time_of_an_error_in_a_later_move_counts_from_the_start_of_the_traje
     assert times[1:] == pytest.approx([times[0] + 2.5, times[0] + 1.5], rel=1e-12)
 
 
+@pytest.mark.full
 def test_a_hint_about_orientation_stands_where_it_helps() -> None:
     far, turned = {"xyz": [3, 0, 0]}, {"xyz": [0.93, 0, 0.1], "rpy": [0, 0, 1]}
     for to, helps in ((far, False), ({**far, "rpy": [0, 0, 1]}, False), (turned, True)):

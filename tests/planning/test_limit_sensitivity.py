@@ -159,6 +159,7 @@ def test_a_path_binds_all_the_time() -> None:
     assert saved(plan)[0, 1] == pytest.approx(3.5 - (3 / RAISED + RAISED / 2), abs=1e-4)
 
 
+@pytest.mark.full
 def test_a_limit_by_position_against_dense_samples() -> None:
     """x = (2 - t)^2 ahead of the end is what a deceleration of 2 leaves: at the limit all the time.
 

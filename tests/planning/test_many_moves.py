@@ -23,6 +23,7 @@ def _calls(moves: int) -> int:
     return calls_of(lambda: plan_job(loaded))
 
 
+@pytest.mark.full
 def test_calls_grow_as_the_number_of_moves() -> None:
     _calls(5)  # what is made once
     few, more, many = (_calls(moves) for moves in (35, 105, 315))

@@ -69,6 +69,7 @@ def test_planners_that_find_their_duration_keep_the_limits_and_use_all_of_them(p
     assert bool(stretches) is (planner != "time_optimal")
 
 
+@pytest.mark.full
 def test_without_the_limits_the_same_moves_are_faster() -> None:
     free = {"joints": [{k: v for k, v in j.items() if k != "velocity_by_position"} for j in ROBOT["joints"]]}
     for planner, move in MOVES.items():
@@ -83,6 +84,7 @@ def test_without_the_limits_the_same_moves_are_faster() -> None:
         assert sampled_use(other) > 1.01
 
 
+@pytest.mark.full
 def test_a_time_optimal_motion_follows_the_limit_as_the_integral_says() -> None:
     """Without other limits it takes the integral of dq / (sqrt(2 d x) - o): (y + o ln(y - o)) / d, y^2 = 2 d x."""
     d, o, end = 2.0, 0.3, 3.0
@@ -119,6 +121,7 @@ def test_a_given_duration_is_judged_and_slowed_only_where_that_is_asked_for() ->
     assert [e.kind for e in slowed.events] == ["slowed"]
 
 
+@pytest.mark.full
 def test_a_move_between_moving_states_is_slowed_too() -> None:
     moves = [
         {"planner": "quintic", "to": {"joints": [0.5, 0], "velocity": [0.5, 0]}, "duration": 1.5},
@@ -165,6 +168,7 @@ def test_a_tighter_range_of_a_move_brings_the_limit_nearer() -> None:
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", ["quintic", "jerk_limited", "time_optimal", "cycloidal"])
 def test_laws_of_tool_paths_keep_the_limits(shape: str) -> None:
     near = {"deceleration": 1.0, "offset": 0.1}

@@ -21,6 +21,7 @@ def planned(job: dict) -> Plan:
     return plan
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", few(range(1, 25), 1))
 def test_a_random_program_is_faster_than_by_other_rules(seed):
     """Pilz's blend of moves that stop, slowed until limits are kept, and the closed form of justblend."""

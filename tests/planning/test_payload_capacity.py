@@ -64,6 +64,7 @@ def verifies(text: str, mass: float) -> bool:
         return False
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("job", "at", "outside"),
     few(
@@ -118,6 +119,7 @@ def test_where_each_mass_has_its_own_motion_few_are_tried(monkeypatch) -> None: 
     assert verifies(LIFTING.replace("mass: 2", "mass: MASS"), mass)
 
 
+@pytest.mark.full
 def test_what_binds_is_said_with_its_place() -> None:
     loaded = job_from_text(EMPTY)
     found = payload_capacity(loaded)

@@ -110,6 +110,7 @@ def test_on_a_path_the_rail_goes_evenly_with_s() -> None:
     assert q[0] == pytest.approx(3.4, abs=1e-6)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "law", [{"shape": "quintic", "speed": 0.4, "acceleration": 1}, {"shape": "time_optimal"}]
 )

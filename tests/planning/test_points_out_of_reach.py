@@ -74,6 +74,7 @@ def test_a_named_point_is_named_at_its_line(move: str, line: int, name: str) -> 
     assert (problem.place.line, problem.move) == (line, 0)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("move", "pointed"),
     few(

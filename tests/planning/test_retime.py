@@ -79,6 +79,7 @@ def test_slow_is_the_smallest_stretch_from_rest_to_rest(seed: int, tag: str) -> 
     assert "{" not in event.message
 
 
+@pytest.mark.full
 @settings(max_examples=5, deadline=None)
 @given(seed=SEEDS, tag=st.sampled_from(["cubic", "quintic", "septic", "trapezoid"]), joints=st.integers(1, 3))
 def test_slow_is_the_smallest_stretch_between_moving_states(seed: int, tag: str, joints: int) -> None:

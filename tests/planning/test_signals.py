@@ -57,6 +57,7 @@ def tool(plan: Plan, *times: float) -> np.ndarray:
     return forward(plan.loaded.robot, plan.trajectory.curve.evaluate(np.array(times)))[:, :3, 3]
 
 
+@pytest.mark.full
 def test_at_a_stop_every_moment_is_the_arrival() -> None:
     some = [at("enter"), at("nearest", 0.03), at("leave", -0.02)]
     plan = planned(line(0, 0, 80, at=some), line(80, 0, 0))
@@ -64,6 +65,7 @@ def test_at_a_stop_every_moment_is_the_arrival() -> None:
     assert times_of(plan) == pytest.approx([arrival - 0.03, arrival, arrival + 0.02], abs=1e-12)
 
 
+@pytest.mark.full
 def test_a_signal_between_moves_is_set_where_the_arm_stands() -> None:
     plan = planned(line(0, 0, 80), {"signal": "s", "value": 2.5}, line(80, 0, 0))
     assert times_of(plan) == [plan.moves[0].duration]
@@ -124,6 +126,7 @@ def test_slowed_moves_set_their_signals_where_they_did() -> None:
     assert np.linalg.norm(early - start) == pytest.approx(0.025, abs=2e-6)
 
 
+@pytest.mark.full
 def test_report_explain_and_the_resolved_job_say_them() -> None:
     plan = planned(line(0, 0, 80, at=at({"path": 25})), {"signal": "lamp", "value": 0.5}, line(80, 0, 0))
     said = [(s.name, s.value, s.move, s.time) for s in report_of(plan).signals]

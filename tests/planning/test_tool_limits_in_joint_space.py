@@ -173,6 +173,7 @@ def test_slow_stretches_a_given_duration() -> None:
     assert [event.kind for event in plan.events] == ["slowed"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("given", [{}, {"duration": 0.9}])
 def test_between_moving_states_the_search_sees_the_tool(given: dict[str, float]) -> None:
     move = {"planner": "quintic", "to": {"joints": [0.1 + TURN], "velocity": [0.3]}, **given}

@@ -204,6 +204,7 @@ def test_tools_are_in_reports_titles_and_explanations() -> None:
     assert report_of(one).moves[0].mounted is None
 
 
+@pytest.mark.full
 def test_a_zone_before_a_tool_change_is_a_stop() -> None:
     limits = {"acceleration": 800, "jerk": 4000, "tcp": {"speed": 250, "acceleration": 2000}}
     law = {"shape": "time_optimal"}

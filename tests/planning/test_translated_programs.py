@@ -170,6 +170,7 @@ def test_a_table_is_flown_to_within_its_zone_with_the_tool_down() -> None:
     assert hold.end - hold.start == pytest.approx(0.3)
 
 
+@pytest.mark.full
 def test_a_palletiser_carries_its_boxes_from_the_infeed_to_the_slots() -> None:
     plan = plan_of("RAPID: a palletiser")
     carrying = [(span.payload.mass if span.payload else 0.0) for span in plan.trajectory.spans]
@@ -194,6 +195,7 @@ def test_a_bead_has_the_speed_and_the_round_end_of_the_original() -> None:
     assert signal_times(plan) == [(pytest.approx(arrival - 0.03), 1.0), (pytest.approx(last), 0.0)]
 
 
+@pytest.mark.full
 def test_parts_are_gripped_at_the_tray_and_let_go_in_the_chuck() -> None:
     plan = plan_of("URScript")
     times, values = zip(*signal_times(plan), strict=True)
@@ -226,6 +228,7 @@ def test_a_weave_goes_to_both_sides_of_its_seam_alike() -> None:
     assert top_speed(plan, 9) == pytest.approx(10, abs=0.001)
 
 
+@pytest.mark.full
 def test_a_part_goes_over_the_edge_on_a_circle() -> None:
     plan = plan_of("Pilz")
     over = plan.trajectory.spans[4]

@@ -94,6 +94,7 @@ def horizontal(robot: Any, q: np.ndarray) -> float:
     return float(centre[:2] @ (np.array([[c, -s], [s, c]]) @ ahead) / np.linalg.norm(ahead))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "make"),
     [

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from jerk_paths import PANDA, both, judged, spline
 from test_jerk_limited_laws import judged_problem, random_problem, ruckig_duration
+from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.turning_bound import turning_bound
@@ -46,7 +47,7 @@ def test_half_of_a_motion_there_and_back_has_a_free_acceleration(jerk):
     assert duration == pytest.approx(2 * least_with_free_start(0.7, 1.0, 4.0, jerk), rel=1e-4)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", few(range(12)))
 def test_no_law_is_faster(seed):
     path, *bounds = random_problem(seed)
     motion = judged_problem(seed)

@@ -115,6 +115,7 @@ def test_an_offset_along_the_axes_of_a_frame() -> None:
     np.testing.assert_allclose(found[:3, :3], axes @ turn @ axes.T @ pick[:3, :3], atol=1e-12)
 
 
+@pytest.mark.full
 def test_a_frame_that_turns_with_its_base_leaves_the_joints_alone() -> None:
     text = """\
 frames: {cell: {in: base, xyz: [400, 100, 100]}}

@@ -107,6 +107,7 @@ def test_approach_and_retreat_are_the_moves_written_out(short: list[str], long: 
     assert_same_motion(planned(moves(*short)), planned(moves(*long)))
 
 
+@pytest.mark.full
 def test_from_where_the_arm_stands_an_approach_comes_back_to_the_target() -> None:
     """Joints that turn by some angles are reached straight, from a point before them."""
     plan = planned(
@@ -148,6 +149,7 @@ DEFAULTS = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("defaults", "move", "written"), few(DEFAULTS, 3))
 def test_defaults_are_written_into_the_moves(defaults: str, move: str, written: str) -> None:
     bare = move.partition(", law")[0].partition(", tolerance")[0]
@@ -155,6 +157,7 @@ def test_defaults_are_written_into_the_moves(defaults: str, move: str, written: 
     assert_same_bytes(plan, planned(moves("planner: jerk_limited, to: pose", f"{bare}, {written}")))
 
 
+@pytest.mark.full
 def test_defaults_hold_for_the_straight_part_of_an_approach_and_for_nothing_in_joint_space() -> None:
     plan = planned("defaults: {law: {speed: 100}}\n" + moves("planner: jerk_limited, to: pose, approach: 40"))
     law = "law: {shape: time_optimal, speed: 100}"

@@ -55,6 +55,7 @@ CELL = Rotation.from_euler("xyz", [0, 10, 90], degrees=True).as_matrix()
 TURN = Rotation.from_euler("xyz", [5, 0, 10], degrees=True)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("frame", "axes"),
     [("", None), (", frame: tool", None), (", frame: world", np.eye(3)), (", frame: cell", CELL)],
@@ -134,6 +135,7 @@ def test_the_resolved_job_says_it_in_the_same_words() -> None:
     )
 
 
+@pytest.mark.full
 def test_rounds_that_go_on_from_here() -> None:
     step = f"{{planner: line, to: {{from: here, offset: {{xyz: [0, 0, -20]}}}}, {LAW}}}"
     plan = planned("planner: jerk_limited, to: pose", f"repeat: 4, moves: [{step}]")

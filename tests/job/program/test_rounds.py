@@ -62,6 +62,7 @@ def by_hand() -> str:
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.full
 def test_a_pallet_is_the_moves_written_out() -> None:
     plan, other = planned(PALLET), planned(by_hand())
     assert [span.planner for span in plan.trajectory.spans] == [
@@ -74,6 +75,7 @@ def test_a_pallet_is_the_moves_written_out() -> None:
         assert np.abs(rows - expected).max() < 1e-6 * np.abs(expected).max()
 
 
+@pytest.mark.full
 def test_the_resolved_job_is_the_expanded_one_bit_by_bit() -> None:
     plan = planned(PALLET)
     again = plan_job(job_from_text(dump_job(plan.loaded)))

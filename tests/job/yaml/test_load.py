@@ -152,6 +152,7 @@ def _usable(data: object) -> bool:
     return not any(ord(c) in (0xFFFE, 0xFFFF) for c in json.dumps(data, ensure_ascii=False))
 
 
+@pytest.mark.full
 @settings(deadline=None, max_examples=150)
 @given(ROOTS.filter(_usable), st.booleans(), st.sampled_from([None, 2]))
 def test_json_is_read_as_json_is(data: dict[str, object], ascii_only: bool, indent: int | None) -> None:
@@ -252,6 +253,7 @@ def check_refusal(data: bytes | str) -> None:
         assert problem.place.length >= 1
 
 
+@pytest.mark.full
 def test_long_files_load_faster_than_with_pyyaml() -> None:
     if load._Loader is load._PureLoader:
         pytest.skip("without libyaml")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tiers import few
 
 from trajcli.columns import group_of, parse_column
 from trajcli.errors import InputError
@@ -60,7 +61,7 @@ def of_tool(found: Judgement) -> dict[str | None, Finding]:
     return {finding.quantity: finding for finding in found.findings if finding.kind == "tool"}
 
 
-@pytest.mark.parametrize("columns", ALONE)
+@pytest.mark.parametrize("columns", few(ALONE, 3))
 def test_rows_of_the_tool_alone_are_known(columns: str, tmp_path: Path) -> None:
     plan, file = planned(columns), tmp_path / "rows.csv"
     names, rows = written(plan, file)
@@ -69,7 +70,7 @@ def test_rows_of_the_tool_alone_are_known(columns: str, tmp_path: Path) -> None:
     assert found.planned_rows is False
 
 
-@pytest.mark.parametrize("columns", ALONE)
+@pytest.mark.parametrize("columns", few(ALONE, 3))
 def test_the_tool_twice_as_fast_is_over_its_limits(columns: str, tmp_path: Path) -> None:
     # of a motion in half the time, velocities double and accelerations are four times as large
     plan, file = planned(columns), tmp_path / "rows.csv"
@@ -203,14 +204,17 @@ OF_RATES = np.sqrt(3.0) * (HALF_MM + HALF_DEG)
 
 @pytest.mark.parametrize(
     ("group", "name", "quantity", "rounding"),
-    [
-        ("q", "x_mm", "position", OF_JOINTS),
-        ("qd", "vy_mm", "velocity", OF_JOINTS),
-        ("qdd", "az_mm", "acceleration", OF_JOINTS),
-        ("pose", "x_mm", "position", np.sqrt(3.0) * HALF_MM + 2.0 * 0.5e-3),
-        ("twist", "vy_mm", "velocity", OF_RATES),
-        ("twistd", "az_mm", "acceleration", OF_RATES),
-    ],
+    few(
+        [
+            ("q", "x_mm", "position", OF_JOINTS),
+            ("qd", "vy_mm", "velocity", OF_JOINTS),
+            ("qdd", "az_mm", "acceleration", OF_JOINTS),
+            ("pose", "x_mm", "position", np.sqrt(3.0) * HALF_MM + 2.0 * 0.5e-3),
+            ("twist", "vy_mm", "velocity", OF_RATES),
+            ("twistd", "az_mm", "acceleration", OF_RATES),
+        ],
+        3,
+    ),
 )
 def test_few_decimals_of_a_group_are_no_faults_and_hide_few(
     group: str,

@@ -77,6 +77,7 @@ def test_derivatives_are_those_of_differences(walled):
     assert second == pytest.approx((values[0] - 2 * values[1] + values[2]) / step**2, rel=1e-4)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("walled", [False, True])
 def test_states_lead_to_a_motion_that_is_faster_than_stopping(walled):
     problem = waypoint_problem(3, walled).scaled()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from jerk_limited_moves import arm, misses, move_to, ruckigs_own, state
+from tiers import few
 
 from trajcli.checks.verify import verify
 from trajcli.job.read import job_from_text
@@ -67,7 +68,7 @@ def _judged(planner, start, robot):
     return planned, verify(move.alone(), [robot.limits], [move.promise])
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", few(range(40)))
 @pytest.mark.parametrize("fields", [{}, {"synchronize": "none"}, {"minimum_duration": 30.0}])
 def test_random_starts_outside_verify(seed, fields):
     start, end, robot = _outside(seed, 3)
@@ -76,7 +77,7 @@ def test_random_starts_outside_verify(seed, fields):
     assert misses(planned.curve, start, end, 1e-9) == []
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", few(range(40)))
 def test_random_starts_outside_to_a_velocity(seed):
     start, end, robot = _outside(seed, 2)
     planned, verdict = _judged(move_to(end, joints=False, brake=True), start, robot)
@@ -84,7 +85,7 @@ def test_random_starts_outside_to_a_velocity(seed):
     np.testing.assert_allclose(planned.curve.piece_ends(1)[1][-1], 0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", few(range(40)))
 def test_random_starts_outside_on_one_line(seed):
     rng = np.random.default_rng(seed)
     _, _, robot = _outside(seed, 3)

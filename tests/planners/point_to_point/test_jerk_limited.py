@@ -27,6 +27,7 @@ from trajcli.planners.ruckig import BoundaryProblem, fastest
 SEEDS, JOINTS = st.integers(0, 2**32 - 1), st.integers(1, 12)
 
 
+@pytest.mark.full
 @settings(max_examples=60, deadline=None)
 @given(SEEDS, JOINTS)
 def test_time_synchronised_motion(seed, n):

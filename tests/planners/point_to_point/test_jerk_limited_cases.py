@@ -66,6 +66,7 @@ def test_run_up_of_each_joint_keeps_the_velocity_it_has_reached():
     assert misses(planned.curve, start, planned.end) == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("distance", [1.0, 2000.0])
 def test_tiny_displacement_beside_a_long_one(distance):
     for tiny in (1e-6, 1e-8, 1e-9, 1e-13, 1e-17):

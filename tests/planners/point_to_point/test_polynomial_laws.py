@@ -139,6 +139,7 @@ def extreme_values(curve: PiecewisePolynomial, piece: int, joint: int, order: in
     return polynomial.polyval(np.concatenate([inside, [0.0, 1.0]]), of_order) / length**order
 
 
+@pytest.mark.full
 @few
 @given(seed=SEEDS, tag=st.sampled_from(LAWS), joints=st.integers(1, MOST_JOINTS))
 def test_the_fastest_from_rest_to_rest_touches_a_limit(seed: int, tag: str, joints: int) -> None:

@@ -32,6 +32,7 @@ def ramp(first: tuple[float, float], last: tuple[float, float], jerk: float, rat
     return distance + middle * down + peak * down**2 / 2 - jerk * down**3 / 6
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(4))
 def test_no_limit_is_exceeded_by_rounding(seed: int) -> None:
     """A displacement that just allows full velocity leaves a cruise of about no length."""

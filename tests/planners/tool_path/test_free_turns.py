@@ -22,6 +22,7 @@ def turning(made):
     return float(np.linalg.norm(twist[:, 3:], axis=1).max())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", few(SHAPES, 4))
 @pytest.mark.parametrize(
     "free",

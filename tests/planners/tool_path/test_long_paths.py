@@ -89,6 +89,7 @@ def test_overlapping_segments_add_up_as_the_textbook_says(side):
     np.testing.assert_allclose(motion.law.evaluate(times)[:, 0], s_total, atol=1e-12)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "fields", [{"radius": 0.001}, {"corner": "stop"}, {"corner": "overlap", "overlap": 0.05}]
 )

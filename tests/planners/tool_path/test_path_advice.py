@@ -36,6 +36,7 @@ def planned(segment: str, *changes: tuple[str, str]) -> Plan:
     return plan_job(job_from_text(text))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("segment", "line", "said"),
     [
@@ -53,6 +54,7 @@ def test_errors_stand_at_their_segment(segment: str, line: int, said: str) -> No
     assert said in f"{problem.message} | {problem.hint}"
 
 
+@pytest.mark.full
 def test_a_radius_of_zero_stops_at_that_corner_alone() -> None:
     third = "{line: {xyz: [450, 120, 200]}}"
     plan = planned(

@@ -121,6 +121,7 @@ def test_near_poses_are_left_out_and_told(tmp_path):
     same_motion(made, planned(tmp_path, HEADER, written(AROUND[1:], TILTS[1:])))
 
 
+@pytest.mark.full
 def test_a_path_of_poses_is_flown_by(tmp_path):
     """With a zone at its end, as lines are."""
     more = {"planner": "line", "to": {"xyz": [0.40, 0.12, 0.32]}, "law": {"speed": 0.2}}

@@ -79,6 +79,7 @@ def test_the_law_of_the_move_counts_where_a_segment_has_none():
     assert made.trajectory.duration == pytest.approx(first + last, rel=1e-6)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("jerk", [None, JERKY["jerk"]])
 def test_each_segment_keeps_its_speed_and_holds_it(jerk):
     made = bent(jerk)
@@ -92,6 +93,7 @@ def test_each_segment_keeps_its_speed_and_holds_it(jerk):
         assert found.max() >= 0.97 * most
 
 
+@pytest.mark.full
 def test_a_radius_of_zero_stops_at_that_corner_alone():
     made = bent()
     tool, curve = made.moves[0].planned.tool, made.trajectory.curve

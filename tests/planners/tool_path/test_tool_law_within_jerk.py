@@ -35,6 +35,7 @@ def fastest(move, limits, **law):
     return made
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("move", [TURN, ARC, CORNER], ids=["turn", "arc", "corner"])
 def test_limits_of_the_jerk_of_joints_are_kept_without_steps(move):
     """The verdict judges the jerk for all t, and steps of joints with a limit of jerk."""
@@ -60,6 +61,7 @@ def test_the_jerk_of_the_tool_along_a_line_is_that_of_ruckig():
     assert jerk.magnitude[0] <= 4.0 * (1 + 1e-9)
 
 
+@pytest.mark.full
 def test_a_law_may_name_a_lower_jerk():
     limits = {"acceleration": 10, "tcp": {"speed": 0.25, "acceleration": 2.0, "jerk": 20.0}}
     slower, faster = (fastest(ARC, limits, jerk=jerk).trajectory.duration for jerk in (5.0, 20.0))

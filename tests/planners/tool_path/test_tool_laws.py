@@ -58,6 +58,7 @@ def test_a_duration_is_kept(shape):
     np.testing.assert_allclose(middle, [0.4, 0.2, 0.15], atol=2e-6)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_minimum_duration_is_no_less(shape):
     jerk = {"jerk": 25.0} if shape == "jerk_limited" else {}

@@ -58,6 +58,7 @@ def test_a_chain_with_stops_lasts_as_long_as_its_segments():
     assert away_from_segments(poses_of(made, times_of(made, 1001))[:, :3, 3]).max() < 2e-6
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("radius", [0.005, 0.02, 0.04])
 def test_a_rounded_corner_leaves_the_segments_only_within_its_radius(radius):
     made = plan("ur5e", START, path(corner="round", radius=radius))
@@ -152,6 +153,7 @@ def test_overlapping_segments_keep_the_tools_acceleration():
     assert acceleration.max() <= TCP["acceleration"] * (1 + 1e-5)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("corner", [{"corner": "stop"}, {"corner": "round", "radius": 0.02}])
 def test_the_fastest_law_keeps_all_limits_and_uses_one(corner):
     limits = {**LIMITS, "velocity": 1.5, "acceleration": 6.0}

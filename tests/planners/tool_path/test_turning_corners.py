@@ -34,6 +34,7 @@ def peak(made):
     return tool_rates(made, times_of(made, 8001))[3].max()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", ["trapezoid", "quintic", "cycloidal"])
 def test_a_rate_that_grows_while_the_law_speeds_up(shape):
     """About one axis a rate that grows with the way, and a speed that grows with time, add up.

@@ -76,6 +76,7 @@ def nominal(corners, slope, phase):
     return np.interp(phase, fine, wave / wave.max())
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("shape", "corners", "slope"),
     [("triangle", (0.25, 0.75), 4.0), ("trapezoid", (0.125, 0.375, 0.625, 0.875), 8.0)],
@@ -104,6 +105,7 @@ def test_flanks_are_straight_and_corners_rounded_within_five_percent(shape, corn
     assert slope * steeper == pytest.approx(np.abs(np.gradient(swing[rows], s[rows] / CYCLE)).max(), rel=0.05)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", ["sine", "triangle", "trapezoid"])
 def test_about_a_line_the_distance_from_the_weave_is_proven(shape):
     """The bound is above what rows show, and within the tolerance; about a corner only rows say it."""
@@ -148,12 +150,14 @@ def test_a_frequency_is_the_speed_of_the_law_over_a_length():
     assert np.array_equal(other.trajectory.curve.evaluate(times), same.trajectory.curve.evaluate(times))
 
 
+@pytest.mark.full
 def test_a_side_says_where_it_swings_first():
     s, places = on_rows(weaving(weave={"side": [0.0, 0.0, 1.0]}))
     assert np.abs(places[:, 2] - 0.3 - A * np.sin(2 * np.pi * s / CYCLE)).max() < TOLERANCE
     assert np.abs(places[:, 0] - 0.4).max() < TOLERANCE
 
 
+@pytest.mark.full
 def test_an_arc_weaves_along_its_radius():
     """With the tool's z along the axis: the radius swings, and s goes round evenly."""
     move = {"planner": "arc", "center": [0.4, 0.0, 0.3], "axis": "z", "angle": np.pi}
@@ -167,6 +171,7 @@ def test_an_arc_weaves_along_its_radius():
     assert np.abs(np.unwrap(np.arctan2(off[:, 1], off[:, 0])) + np.pi / 2 - s / 0.1).max() < 10 * TOLERANCE
 
 
+@pytest.mark.full
 def test_a_rounded_corner_is_woven_around_and_a_stop_is_on_the_seam():
     corner, end = [0.4, 0.0, 0.3], [0.48, 0.0, 0.3]
     for radius in (0.02, 0.0):
@@ -241,6 +246,7 @@ def test_weaves_that_are_none(move, weave, message):
     assert message in problems[0].message
 
 
+@pytest.mark.full
 def test_a_weave_is_not_flown_by():
     """A zone of its own is an error; the job's is not used there."""
     weave = {"amplitude": A, "length": CYCLE}

@@ -43,6 +43,7 @@ def line(*angles, xyz=XYZ, **rest):
 START = pose(180, 0, 0, configuration=LEFT)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("angle", [270, -270, 360, 200, 90, -170, 180])
 @pytest.mark.parametrize("xyz", [XYZ, [400, 200, 300]], ids=["in_place", "line"])
 def test_the_tool_turns_as_far_as_the_angles_say(angle, xyz):
@@ -51,6 +52,7 @@ def test_the_tool_turns_as_far_as_the_angles_say(angle, xyz):
     np.testing.assert_allclose(sum_, [0, 0, angle], atol=0.01)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("angle", [270, -300])
 def test_on_an_arc_and_on_a_path(angle):
     end = [400, 300, 300]
@@ -64,6 +66,7 @@ def test_on_an_arc_and_on_a_path(angle):
         np.testing.assert_allclose(sum_, [0, 0, angle], atol=0.02)
 
 
+@pytest.mark.full
 def test_whole_turns_are_counted_from_the_target_before():
     sums = turned(line(180, 0, 270), {"planner": "hold", "duration": 1}, line(180, 0, 300), start=START)
     np.testing.assert_allclose([s[2] for s in sums], [270, 0, 30], atol=0.02)
@@ -86,6 +89,7 @@ def test_start_that_is_not_typed_is_read_within_half_a_turn():
     assert sum_[2] == pytest.approx(270 - np.degrees(0.4), abs=0.02)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("angle", "expected"), [(270, 90), (-270, -90)])
 def test_half_a_turn_at_the_start_is_on_the_side_of_the_target(angle, expected):
     """Rounding must not choose between 180 and -180 deg: the third angle begins at the nearer one."""

@@ -34,6 +34,7 @@ def jobs_of(case):
     yield blends(start, each, blend_durations=durations[0])
 
 
+@pytest.mark.full
 @cases("blends", "lspb_via")
 def test_the_slides(case):
     inputs, expected, within = case["inputs"], case["expected"], case["tolerance"]
@@ -59,6 +60,7 @@ def test_the_slides(case):
         assert [e.kind for e in made.events] == (["begins_before"] if begins > within else [])
 
 
+@pytest.mark.full
 def test_ends_in_motion():
     """Inside, the points at the ends are kept; a centred blend begins where the motion before it would be."""
     q, v, tau, t = np.array([[0.0, 1], [2, 0], [1, 3]]), np.array([[0.5, 0], [-1, 0.25]]), 0.3, [0, 1, 3]

@@ -41,6 +41,7 @@ def test_slower_joints_beside_change_nothing():
     assert through_sine(120, amplitudes=(1.0, 0.3)).trajectory.duration < 1.05 * FASTEST
 
 
+@pytest.mark.full
 def test_event_says_that_faster_times_may_exist():
     """A quintic with computed accelerations cannot follow dense points smoothly."""
     planned = through_sine(150, "quintic")

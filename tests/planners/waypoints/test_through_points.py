@@ -71,6 +71,7 @@ def test_a_target_after_the_recording(tmp_path):
     assert len(free.moves[0].planned.via_points.times) == 3, "the last row and the target are one point"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_repeated_rows_are_left_out_and_told(tmp_path, planner):
     text = "q1,q2\n0,0\n0,0\n0.5,0\n0.5,0.0005\n1,1\n1,1\n"
@@ -189,6 +190,7 @@ def test_a_wrong_table(through, message):
     assert error.exit_code == 2
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_a_table_is_the_list_of_its_rows(planner):
     rows = np.random.default_rng(1).uniform(-1, 1, (4, 2)).tolist()
@@ -253,6 +255,7 @@ def test_a_pose_is_reached_near_the_point_before_it(table):
     assert np.linalg.norm(joints - answers[1]) > 1
 
 
+@pytest.mark.full
 def test_a_pose_out_of_reach_names_the_waypoint():
     job = {
         "version": 1,
@@ -268,6 +271,7 @@ def test_a_pose_out_of_reach_names_the_waypoint():
         plan_job(job_from_text(json.dumps(job)))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("planner", PLANNERS)
 @pytest.mark.parametrize("times", ["t,", ""])
 def test_a_job_written_out_is_the_same_plan(tmp_path, planner, times):

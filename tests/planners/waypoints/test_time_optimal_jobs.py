@@ -80,6 +80,7 @@ def test_always_some_limit_is_used(rule):
     assert np.mean(used > 0.9) > 0.98  # the grid is as coarse as a duration within 1 % allows
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("scale", [1e-4, 1e4])
 def test_the_scale_of_the_parameter_does_not_matter(scale):
     q = points(3)
@@ -233,6 +234,7 @@ def test_a_stretch_is_a_concession_from_a_thousandth_on():
         assert f"stretched {factor} times" in event.message
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("middle", "merged"), [([[60, 30]], set()), ([[60, 30], [60, 30]], {"merged"})])
 def test_a_finer_grid_is_no_concession_and_a_point_left_out_is(tmp_path, capfd, middle, merged):
     from trajcli.cli.app import app

@@ -32,6 +32,7 @@ def refused(rows=POINTS, *, limits=LIMITS, **rest):
     return refusal(*move(rows, **rest), limits=limits).problems[0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "fields",
     few(
@@ -68,6 +69,7 @@ def test_corners_stay_within_their_deviation_and_straight_in_between():
     assert not missed[[0, -1]].any()
 
 
+@pytest.mark.full
 def test_jerk_ignored_is_as_without_limits_of_jerk():
     without = {key: value for key, value in LIMITS.items() if key != "jerk"}
     reference = curve_of(fastest(limits=without))
@@ -121,6 +123,7 @@ def test_a_speed_from_which_nothing_stops_in_time_is_refused():
     assert "velocity" in refused([[0.0], [0.01]], start={"velocity": [1.0]}).message
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "rows",
     few(
@@ -140,6 +143,7 @@ def test_degenerate_points_have_a_motion(rows, path):
     fastest(rows, path=path)
 
 
+@pytest.mark.full
 def test_moves_hand_their_acceleration_on():
     """The state that jerk_limited leaves behind is where the next law begins."""
     state = {"joints": [0.6, -0.2], "velocity": [0.3, 0.3], "acceleration": [1.0, 0.2]}

@@ -28,6 +28,7 @@ def judged(case, plan):
     return duration / known
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("case", few(EXAMPLES, 2))
 def test_documented_examples_reach_their_goals(case):
     plan = planned(case)

@@ -44,6 +44,7 @@ def refusal(error, **fields):
     return caught.value.problems
 
 
+@pytest.mark.full
 @settings(max_examples=12, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_random_lists_keep_limits_and_points_and_are_not_slower_than_stopping(seed):
@@ -61,6 +62,7 @@ def test_random_lists_keep_limits_and_points_and_are_not_slower_than_stopping(se
     assert plan.trajectory.duration <= stopping(case) * (1 + 1e-9)
 
 
+@pytest.mark.full
 def test_same_job_same_motion():
     curves = [plan_of(starts=2).trajectory.curve for _ in range(2)]
     np.testing.assert_array_equal(curves[0].breaks, curves[1].breaks)
@@ -80,6 +82,7 @@ def test_more_starts_are_not_slower():
     assert durations[0] >= durations[1] * (1 - 1e-9) >= durations[2] * (1 - 2e-9)
 
 
+@pytest.mark.full
 def test_velocity_of_a_joint_is_kept_and_the_others_are_found():
     plan = plan_of(points={1: {"velocity": {"j2": -0.5}}, 2: {"acceleration": {"j1": 0.25, "j3": 0.0}}})
     velocity, acceleration = at_points(plan, 1), at_points(plan, 2)
@@ -244,6 +247,7 @@ def test_what_is_said_of_a_stretched_motion_is_about_that_motion():
     assert above > 1
 
 
+@pytest.mark.full
 def test_report_says_how_near_to_the_fastest_it_is():
     from trajcli.output.report import report_of
 
