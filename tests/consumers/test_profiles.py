@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,9 @@ import pytest
 from planted_faults import motion, surroundings
 
 from trajcli.consumers.judgement import CHECKS, judge_by_profile, load_profile
-from trajcli.consumers.profile import PROFILES, profile_names
+from trajcli.consumers.profile import PROFILES, Profile, profile_names
 from trajcli.errors import InputError
+from trajcli.judge.reconstruction import INTERPOLATIONS
 
 MADE_UP = """\
 title: A shaking table
@@ -136,3 +138,150 @@ def test_limits_are_those_of_the_catalogue() -> None:
         if name == "franka-fr3":
             near = rules["velocity-by-position"]
             assert (limits.velocity_by_position == np.array([near["deceleration"], near["offset"]]).T).all()
+
+
+WHOLE = """\
+title: A crane
+interpolation: linear
+note: It swings.
+rows: {rate: 250, align: true, columns: [t, q]}
+sources:
+  manual: {text: Manual of the crane, date: "2026-11"}
+  code: {text: crane.cpp, commit: abc1234, date: "2025-01"}
+rules:
+  - id: crane-steps
+    check: differences
+    severity: necessary
+    text: No haste.
+    parameters: {order: velocity, period: 4.0e-3, limit: [0.5, 0.25]}
+    source: code
+  - id: crane-oil
+    severity: recommended
+    text: Oil it.
+    source: manual
+"""
+
+
+def read(folder: Path, text: str) -> Profile:
+    (folder / "crane.yaml").write_text(text)
+    return load_profile("crane", folder)
+
+
+def test_what_stands_in_a_file_is_what_is_read(tmp_path: Path) -> None:
+    found = read(tmp_path, WHOLE)
+    assert (found.name, found.title, found.interpolation, found.note) == (
+        "crane",
+        "A crane",
+        "linear",
+        "It swings.",
+    )
+    assert (found.rows.rate, found.rows.align, found.rows.columns) == (250, True, ("t", "q"))
+    assert found.rows.words == "rows at 250 Hz, moves of whole periods, columns t, q"
+    steps, oil = found.rules
+    assert (steps.id, steps.check, steps.severity) == ("crane-steps", "differences", "necessary")
+    assert steps.parameters == {"order": "velocity", "period": 4e-3, "limit": [0.5, 0.25]}
+    assert (steps.source.text, steps.source.commit, steps.source.date) == ("crane.cpp", "abc1234", "2025-01")
+    assert (oil.check, oil.severity, oil.parameters) == (None, "recommended", {})
+    assert (oil.source.text, oil.source.commit) == ("Manual of the crane", None)
+
+
+def test_without_rows_it_takes_whole_states_at_any_times(tmp_path: Path) -> None:
+    found = read(tmp_path, "\n".join(line for line in WHOLE.splitlines() if not line.startswith("rows")))
+    assert found.rows.words == "columns t, q, qd, qdd"
+    assert (found.rows.rate, found.rows.align) == (None, False)
+    half = read(tmp_path, WHOLE.replace("rate: 250, align: true, columns: [t, q]", "rate: 8"))
+    assert half.rows.words == "rows at 8 Hz, columns t, q, qd, qdd"
+
+
+def test_the_interpolations_of_profiles_are_those_of_check(tmp_path: Path) -> None:
+    for name in INTERPOLATIONS:
+        assert read(tmp_path, WHOLE.replace("linear", name)).interpolation == name
+    for name in ("spline", "Linear", "''"):
+        with pytest.raises(InputError, match="unknown interpolation"):
+            read(tmp_path, WHOLE.replace("linear", name))
+
+
+ROWS, STEPS = "rows: {rate: 250, align: true, columns: [t, q]}", "    text: No haste.\n"
+LIST = "`columns`: expected a list of groups of columns"
+RATE, ALIGN = "`rate`: expected a number above 0, Hz", "`align`: expected true or false"
+NUMBER = "`limit`: expected a number, a list of numbers or a word"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "messages"),
+    [
+        ("rate: 250", "rate: 0", [RATE]),
+        ("rate: 250", "rate: -250", [RATE]),
+        ("rate: 250", "rate: fast", [RATE]),
+        ("rate: 250", "rate: true", [RATE]),
+        ("rate: 250", "rate: .inf", ["expected a finite number, got .inf"]),
+        ("rate: 250", "rate: .nan", ["expected a finite number, got .nan"]),
+        ("align: true", "align: 1", [ALIGN]),
+        ("[t, q]", "[]", [LIST]),
+        ("[t, q]", "[t, place]", [LIST]),
+        ("[t, q]", "[place, q]", [LIST]),
+        ("[t, q]", "t", [LIST]),
+        ("rate: 250, align: true", "rate: 0, align: 1", [RATE, ALIGN]),
+        ("rate: 250", "speed: 250", ["unknown key 'speed'"]),
+        ("rate: 250, align: true", "align: true, speed: 250", ["unknown key 'speed'"]),
+        ("note: It swings.", "notes: It swings.", ["unknown key 'notes'"]),
+        ("note: It swings.", "note: 3", ["`note`: expected a text"]),
+        ("title: A crane", "title: [A crane]", ["`title`: expected a text"]),
+        (ROWS, "rows: 250", ["`rows`: expected a mapping"]),
+        ("text: crane.cpp, ", "", ["`text` is missing"]),
+        ("text: Manual of the crane, ", "", ["`text` is missing"]),
+        ('{text: crane.cpp, commit: abc1234, date: "2025-01"}', "crane.cpp", ["expected a mapping"]),
+        ("commit: abc1234", "branch: main", ["unknown key 'branch'"]),
+        ("    severity: necessary\n", "", ["`severity` is missing"]),
+        ("    severity: recommended\n", "", ["`severity` is missing"]),
+        ("    source: manual\n", "", ["`source` is missing"]),
+        ("    source: manual\n", "    source: manual\n    sorce: code\n", ["unknown key 'sorce'"]),
+        (STEPS, "", ["`text` is missing"]),
+        (STEPS, "    text:\n", ["`text` is missing"]),
+        ("  - id: crane-steps\n    check", "  - check", ["`id` is missing"]),
+        ("severity: necessary", "severity: needed", ["unknown severity 'needed'"]),
+        ("order: velocity, ", "", ["`order` is missing"]),
+        ("order: velocity, period: 4.0e-3, ", "", ["`order` is missing", "`period` is missing"]),
+        ("order: velocity", "order: velocity, oder: 1", ["unknown key 'oder'"]),
+        ("[0.5, 0.25]", "[]", [NUMBER]),
+        ("[0.5, 0.25]", "[0.5, fast]", [NUMBER]),
+        ("[0.5, 0.25]", "[fast, 0.5]", [NUMBER]),
+        ("[0.5, 0.25]", "[0.5, true]", [NUMBER]),
+        ("[0.5, 0.25]", "[0.5, .nan]", ["expected a finite number, got .nan"]),
+        ("[0.5, 0.25]", ".inf", ["expected a finite number, got .inf"]),
+        (
+            "parameters: {order: velocity",
+            "parameters: {note: {a: 1}, order: velocity",
+            ["unknown key 'note'"],
+        ),
+        ("source: code", "source: book", ["unknown source 'book'"]),
+    ],
+)
+def test_every_flaw_of_a_file_is_named(tmp_path: Path, old: str, new: str, messages: list[str]) -> None:
+    assert old in WHOLE
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, WHOLE.replace(old, new, 1))
+    found = [problem.message for problem in caught.value.problems]
+    assert found[: len(messages)] == messages
+    assert all(problem.place is not None for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize("key", ["title", "sources", "rules"])
+def test_what_every_file_has(tmp_path: Path, key: str) -> None:
+    """A file without it is refused, whatever follows from that besides."""
+    parts = re.split(r"^(?=[a-z])", WHOLE, flags=re.MULTILINE)
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, "".join(part for part in parts if not part.startswith(key)))
+    assert f"`{key}` is missing" in [problem.message for problem in caught.value.problems]
+
+
+def test_a_rule_that_stands_twice_is_found_wherever_they_are(tmp_path: Path) -> None:
+    more = "  - {id: crane-steps, severity: recommended, text: Again., source: code}\n"
+    with pytest.raises(InputError, match="the rule 'crane-steps' stands twice"):
+        read(tmp_path, WHOLE + more)
+
+
+def test_a_parameter_may_be_a_yes_or_no(tmp_path: Path) -> None:
+    """Of a note, which no check reads."""
+    found = read(tmp_path, WHOLE + "    parameters: {oil: true, grade: SAE 30, litres: 2}\n")
+    assert found.rules[1].parameters == {"oil": True, "grade": "SAE 30", "litres": 2}

@@ -161,3 +161,37 @@ def test_a_row_that_is_missing_is_told_though_all_others_are_those_of_the_plan(
     assert judgement.planned_rows is (missing is None)
     found = [(each.row, each.severity) for each in judgement.findings if each.kind == "time"]
     assert found == ([] if missing is None else [(missing + 1, "warning")])
+
+
+@pytest.mark.parametrize(
+    ("profile", "asked", "joined", "peak"),
+    [
+        (None, None, "quintic", 15 / 8),
+        ("ros-jtc", None, "jtc", 15 / 8),  # as its controller does, whole states being there
+        ("ros-jtc", "cubic", "cubic", 3 / 2),
+        ("ros-jtc", "linear", "linear", 1.0),
+        ("ros-jtc", "hold", "hold", 0.0),
+        ("ur-servoj", None, "quintic", 15 / 8),  # nobody says how it joins rows
+        ("ur-servoj", "cubic", "cubic", 3 / 2),
+    ],
+)
+def test_rows_are_joined_as_a_profile_says_unless_somebody_says_otherwise(
+    profile: str | None, asked: str | None, joined: str, peak: float, tmp_path: Path
+) -> None:
+    """From rest to rest over 1 rad in 1 s: what a quintic, a cubic, a straight line, and a step reach between rows."""
+    (tmp_path / "arm.yaml").write_text("joints: 1\n")
+    (tmp_path / "rows.csv").write_text("t,q1,qd1,qdd1\n0,0,0,0\n1,1,0,0\n2,1,0,0\n")
+    for limit in (peak - 0.01, peak + 0.01):
+        (tmp_path / "limits.yaml").write_text(f"velocity: {max(limit, 1e-3)}\n")
+        options = CheckOptions(
+            robot=str(tmp_path / "arm.yaml"),
+            limits=str(tmp_path / "limits.yaml"),
+            profile=profile,
+            interpolate=asked,
+        )
+        judgement = check_file(str(tmp_path / "rows.csv"), options).judgement
+        assert judgement.interpolation == joined
+        over = [
+            each.value for each in judgement.findings if (each.rule, each.kind) == ("limit", "velocity")
+        ]
+        assert over == ([pytest.approx(peak)] if 0 < limit < peak else [])

@@ -16,7 +16,7 @@ from yaml_files import read_yaml
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.collocation import interval_rows
 from trajcli.curves.time_optimal.constraints import ConstraintRows, JointConstraint
-from trajcli.curves.time_optimal.passes import UnreachableSpeedError, controllable, solve
+from trajcli.curves.time_optimal.passes import UnlimitedSpeedError, UnreachableSpeedError, controllable, solve
 
 CASES = read_yaml(Path(__file__).parents[2] / "oracles" / "time_optimal.yaml")["cases"]
 NOWHERE = np.empty(0)
@@ -181,3 +181,104 @@ def test_a_joint_that_turns_next_to_a_place_does_no_harm(seed):
         found.append(solve(interval_rows(grid, [demand], NOWHERE), 0.0, 0.0).x)
     for other in found[1:]:
         np.testing.assert_allclose(other, found[0], rtol=1e-9, atol=1e-12)
+
+
+LENGTH, TOP, UP, DOWN = 2.0, 1.5, 3.0, 0.8
+
+
+class Capped:
+    """A largest x between two places of a line."""
+
+    def __init__(self, begin, end, cap):
+        self.begin, self.end, self.cap = begin, end, cap
+
+    def rows(self, s, side):
+        nothing = np.empty((s.size, 0))
+        within = (s >= self.begin) & (s <= self.end)
+        return ConstraintRows(nothing, nothing, nothing, np.where(within, self.cap, np.inf))
+
+
+def line(*further, count=41):
+    """Return the rows of a straight line whose joint speeds up with UP and brakes with DOWN."""
+    path = PiecewisePolynomial([0.0, LENGTH], np.array([1.0, 0.0])[:, None, None])
+    demand = JointConstraint(path, symmetric(TOP), np.array([[-DOWN, UP]]))
+    return interval_rows(np.linspace(0.0, LENGTH, count), [demand, *further], NOWHERE)
+
+
+@pytest.mark.parametrize(("start", "end"), [(0.0, 0.0), (1.0, 0.0), (0.0, 1.2), (1.4, 1.3), (np.inf, np.inf)])
+def test_a_line_is_driven_by_the_laws_of_constant_acceleration(start, end):
+    """v^2 = v0^2 + 2 a s, from either end: what can be reached, from what the end can be reached, and the motion."""
+    rows = line()
+    left, gone = LENGTH - rows.grid, rows.grid
+    found, sets = solve(rows, start, end), controllable(rows, end)
+    braking = np.minimum(TOP**2, end**2 + 2 * DOWN * left)
+    np.testing.assert_allclose(sets.upper, braking, rtol=1e-12)
+    slowest = np.maximum(0.0, end**2 - 2 * UP * left) if np.isfinite(end) else 0.0 * left
+    np.testing.assert_allclose(sets.lower, slowest, rtol=1e-12, atol=1e-12)
+    first = min(start**2, braking[0])
+    np.testing.assert_allclose(found.x, np.minimum(first + 2 * UP * gone, braking), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(found.mvc, TOP**2, rtol=1e-12)
+
+
+@pytest.mark.parametrize("by", [1e-9, 1e-4, 0.01, 0.3])
+def test_speeds_at_the_ends_of_a_line_are_refused_from_the_largest_on(by):
+    """On a short way: what braking from the start, and speeding up to the end, allow."""
+    short = LENGTH / 10
+    path = PiecewisePolynomial([0.0, short], np.array([1.0, 0.0])[:, None, None])
+    demand = JointConstraint(path, symmetric(TOP), np.array([[-DOWN, UP]]))
+    rows = interval_rows(np.linspace(0.0, short, 9), [demand], NOWHERE)
+    start, end = np.sqrt(2 * DOWN * short), np.sqrt(2 * UP * short)
+    solve(rows, start * (1 - by), 0.0), solve(rows, 0.0, end * (1 - by))
+    for speeds, allowed, place in (((start, 0.0), start, 0.0), ((0.0, end), end, short)):
+        with pytest.raises(UnreachableSpeedError) as caught:
+            solve(rows, *(speed * (1 + by) for speed in speeds))
+        assert caught.value.allowed == pytest.approx(allowed, rel=1e-9)
+        assert caught.value.s == place
+
+
+@pytest.mark.parametrize("over", [1.001, 1.05, 1.3])
+@pytest.mark.parametrize("at", [0.5, 1.0, 1.45])
+def test_behind_a_slow_place_an_end_may_be_too_fast_for_every_start(at, over):
+    """From the cap at the place on it is reached by UP at most: from no x before that place, whatever one starts with."""
+    cap = 0.25
+    end = np.sqrt(over * cap + 2 * UP * (LENGTH - at))
+    path = PiecewisePolynomial([0.0, LENGTH], np.array([1.0, 0.0])[:, None, None])
+    demand = JointConstraint(path, symmetric(9.0), np.array([[-DOWN, UP]]))
+    rows = interval_rows(np.linspace(0.0, LENGTH, 41), [demand, Capped(at - 0.01, at + 0.01, cap)], NOWHERE)
+    lower = controllable(rows, end).lower
+    before = rows.grid < at - 0.01
+    assert np.isinf(lower[before]).all()
+    behind = rows.grid > at + 0.01
+    np.testing.assert_allclose(lower[behind], end**2 - 2 * UP * (LENGTH - rows.grid[behind]), rtol=1e-9)
+    reached = np.sqrt(cap + 2 * UP * (LENGTH - at))
+    for start in (0.0, 0.3, np.inf):
+        with pytest.raises(UnreachableSpeedError, match="at the end") as caught:
+            solve(rows, start, end)
+        assert caught.value.allowed == pytest.approx(reached, rel=1e-9)
+        assert solve(rows, start, reached * (1 - 1e-9)).x[-1] == pytest.approx(reached**2)
+
+
+def test_a_cap_within_rounding_of_what_the_end_needs_is_none_that_forbids_it():
+    """The lower end of the set and the cap are the same number but for their rounding."""
+    for at in (0.3, 0.7, 1.1):
+        cap = 2.0 - 2 * UP * (LENGTH - at) if 2.0 > 2 * UP * (LENGTH - at) else 0.25
+        end = np.sqrt(cap + 2 * UP * (LENGTH - at))
+        path = PiecewisePolynomial([0.0, LENGTH], np.array([1.0, 0.0])[:, None, None])
+        demand = JointConstraint(path, symmetric(9.0), np.array([[-DOWN, UP]]))
+        for count in (21, 41, 61, 101):
+            grid = np.union1d(np.linspace(0.0, LENGTH, count), at)
+            rows = interval_rows(grid, [demand, Capped(at, at, cap)], NOWHERE)
+            assert solve(rows, np.inf, end).x[-1] == pytest.approx(end**2)
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.0, 1.0), (0.5, 1.0), (0.25, 0.75)])
+def test_where_nothing_limits_the_motion_is_named(begin, end):
+    """Of four equal parts of a path the joint rests in some: the first place at which no speed is the largest."""
+    s = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+    slopes = np.where((s[:-1] >= begin) & (s[1:] <= end), 0.0, 1.0)
+    values = np.append(0.0, np.cumsum(slopes * 0.25))
+    path = PiecewisePolynomial(s, np.stack([slopes, values[:-1]])[:, :, None])
+    rows = interval_rows(s, [JointConstraint(path, symmetric(1.0), symmetric(1.0))], NOWHERE)
+    with pytest.raises(UnlimitedSpeedError) as caught:
+        solve(rows, np.inf, np.inf)
+    assert begin <= caught.value.s <= end

@@ -1,7 +1,8 @@
-"""Laws whose acceleration changes within an interval: what they promise, and what they gain."""
+"""Laws whose acceleration changes within an interval: what they promise and gain; where a grid loses time, by hand."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 from topp_paths import assert_motion, random_bounds, spline, symmetric
 
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.time_optimal.collocation import IntervalRows
 from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.time_optimal.refinement import first_grid, halved, parts_for, refined, time_lost
 from trajcli.curves.time_optimal.time_law import law_and_trajectory, law_pieces
 
 
@@ -77,3 +80,120 @@ def test_between_its_switches_the_acceleration_is_continuous(seed):
     assert steps(found.trajectory) <= 40
     quintic = PiecewisePolynomial([0.0, 1.0], np.array([0.1, 0, 0, 0.2, 1, 0])[:, None, None])
     assert steps(time_optimal(quintic, symmetric(9.0), symmetric(2.0)).trajectory) <= 2
+
+
+def rows_over(grid, *rows):
+    """Return intervals with rows P x + R y <= C, each of three numbers or of shapes (N,)."""
+    count = grid.size - 1
+    P, R, C = (np.stack([np.broadcast_to(row[k], count) for row in rows]) for k in range(3))
+    none, nothing = np.zeros(len(rows), dtype=np.intp), (np.empty((0, count)),) * 3
+    eased, turning = np.ones((1, count + 1)), np.zeros(count + 1, dtype=bool)
+    cap = np.full(count + 1, np.inf)
+    return IntervalRows(grid, P, R, C, C, eased, cap, turning, none, none, nothing, nothing)
+
+
+FREE = (1.0, 0.0, 1e6)
+"""A row without a say in y."""
+
+
+@pytest.mark.parametrize("bend", [0.02, 0.1])
+@pytest.mark.parametrize("at", [0.1, 0.5, 0.9])
+def test_what_a_chord_loses_below_a_smooth_curve_is_known_within_a_factor_of_three(bend, at):
+    """Of sd^2 = 1 - b (s - at)^2 the exact time, and that of straight lines of sd^2 between ten points."""
+    from scipy.integrate import quad
+
+    grid = np.linspace(0.0, 1.0, 11)
+    x = 1.0 - bend * (grid - at) ** 2
+    durations = 2.0 * np.diff(grid) / (np.sqrt(x[1:]) + np.sqrt(x[:-1]))
+    exact = [quad(lambda s: (1.0 - bend * (s - at) ** 2) ** -0.5, *ends)[0] for ends in pairwise(grid)]
+    lost = time_lost(rows_over(grid, FREE), x, x, durations)[1:-1]
+    share = lost / (durations - exact)[1:-1]
+    assert share.min() >= 1.0
+    assert share.max() <= 3.0
+
+
+@pytest.mark.parametrize("count", [3, 2500])
+@pytest.mark.parametrize(
+    ("up", "down", "below", "unused"),
+    [
+        (0.1, 0.3, 0.6, 0.25),  # of 0.4 between them a quarter is left above
+        (0.3, 0.1, 0.6, 0.25),  # and below: it could brake harder
+        (0.0, 0.4, 0.6, 0.0),  # as fast as it may speed up
+        (0.4, 0.0, 0.6, 0.0),  # or brake
+        (0.2, 0.2, 0.3, 0.3),  # nearer to the curve than to both
+        (0.2, None, 0.6, 0.6),  # nothing bounds how it brakes: there is no range
+        (None, 0.2, 0.6, 0.6),
+    ],
+)
+def test_acceleration_that_is_not_used_costs_half_its_share_of_the_time(count, up, down, below, unused):
+    """sd^2 is even, the curve of the largest one above it; in the last interval as in the first."""
+    grid, x = np.linspace(0.0, 1.0, count + 1), np.full(count + 1, 2.0)
+    rows = [FREE] + ([(-1.0, 1.0, up)] if up is not None else [])
+    rows += [(1.0, -1.0, down)] if down is not None else []
+    durations = np.linspace(1.0, 2.0, count)
+    found = time_lost(rows_over(grid, *rows), x, x / (1.0 - below), durations)
+    np.testing.assert_allclose(found, 0.5 * unused * durations, rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_the_way_to_the_curve_at_the_limit_of_acceleration_loses_nothing(back):
+    """One end is on the curve, the other is not, and its neighbours' lines meet above it."""
+    grid, x = np.arange(4.0), np.array([1.0, 2.0, 2.5, 2.6])
+    mvc = np.array([9.0, 9.0, 2.5, 2.6])
+    rows = (-1.0, 1.0, np.diff(x)), (1.0, -1.0, np.full(3, 5.0))
+    if back:
+        x, mvc = x[::-1], mvc[::-1]
+        rows = (-1.0, 1.0, np.full(3, 5.0)), (1.0, -1.0, -np.diff(x))
+    found = time_lost(rows_over(grid, *rows), x, mvc, np.ones(3))
+    assert found[1] == pytest.approx(0.0, abs=1e-7)
+
+
+def test_no_more_points_are_added_than_there_is_room_for():
+    rng = np.random.default_rng(2)
+    lost = rng.uniform(0, 1, 200) ** 6
+    for room in (0, 7, 100, 300, 600):
+        parts = parts_for(lost, 1e-9, room)
+        assert (parts - 1).sum() <= room
+        assert (np.diff(parts[np.argsort(lost)]) >= 0).all()  # what loses more is cut finer
+    assert (parts_for(lost, 1e9, 600) == 1).all()
+    assert (parts_for(np.zeros(5), 1e-9, 600) == 1).all()
+
+
+def test_intervals_are_cut_so_that_together_they_lose_what_they_may():
+    """By the rule that k parts lose 1 / k^2 of one: rounding of k costs a little."""
+    lost = np.random.default_rng(4).uniform(0.5, 8.0, 400)
+    for target in (0.2, 0.4):
+        parts = parts_for(lost, target * lost.sum(), 10**6)
+        assert (lost / parts**2).sum() == pytest.approx(target * lost.sum(), rel=0.15)
+
+
+def test_every_interval_is_halved():
+    np.testing.assert_allclose(
+        halved(np.array([0.0, 1.0, 4.0, 5.0])), [0, 0.5, 1, 2.5, 4, 4.5, 5], atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("x", [[0.0, 0.1, 1.1, 1.6], [1.6, 1.1, 0.1, 0.0]])
+def test_at_the_ends_no_lines_meet(x):
+    """Beyond the first and the last interval there is none: they are cut in the middle."""
+    found = refined(np.arange(4.0), np.array(x), np.full(3, 2))
+    np.testing.assert_allclose(found[[1, -2]], [0.5, 2.5], atol=1e-15)
+
+
+@pytest.mark.parametrize("apart", [1e-12, 1e-9, 1e-7])
+def test_joints_that_turn_at_all_but_the_same_place_make_no_tiny_interval(apart):
+    """Three parabolas turn within so little; there is one grid point for all of them, and one for a fourth."""
+    turns = np.array([0.3, 0.3 + apart, 0.3 + 2 * apart, 0.7])
+    path = PiecewisePolynomial([0.0, 1.0], np.stack([np.ones(4), -2 * turns, turns**2])[:, None, :])
+    grid = first_grid(path)
+    assert np.diff(grid).min() >= 1e-4 / 96
+    for turn in (0.3, 0.7):
+        assert np.abs(grid - turn).min() <= 2 * apart
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_where_a_joint_turns_by_rounding_alone_there_is_no_grid_point(back):
+    """Of one that stands still beside another, which starts, or ends, without a derivative."""
+    whole = [[1.0, -2.0, 1.0], [1e-17, -7.4e-18, 0.2]] if back else [[1.0, 0.0, 0.0], [1e-17, -7.4e-18, 0.2]]
+    grid = first_grid(PiecewisePolynomial([0.0, 1.0], np.array(whole).T[:, None, :]))
+    assert np.abs(grid - 0.37).min() > 1e-3
