@@ -11,6 +11,7 @@ from line_of_ur5e import JOB, plan
 from recorded_rows import part
 
 import trajcli
+from trajcli.api.plans import PlannedJob
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
@@ -236,6 +237,39 @@ def test_a_path_that_turns_back_is_followed_around_its_corner(back: list[float])
     q, row = rows.q.copy(), len(rows) // 2 + 20  # behind the corner: a fault there is on neither side
     q[row] += np.linalg.solve(trajcli.load_robot("ur5e").jacobian(q[row]), [0.0, 0.0, 3e-5, 0.0, 0.0, 0.0])
     assert max(value or 0.0 for value in deviations(q, rows.qd)) == pytest.approx(3e-5, rel=0.05)
+
+
+def to_and_fro(way: float, turn: float, passes: int) -> PlannedJob:
+    """Return a tool that goes along x, and then to and fro on a short way; it turns about z all the time."""
+    ends = [(0.5 + way * (k % 2), turn * k) for k in range(passes + 1)]
+    segments = [{"line": {"xyz": [x, 0.1, 0.25], "rpy": [np.pi, 0, angle]}} for x, angle in ends]
+    limits = {"tcp": {"speed": 0.25, "acceleration": 1, "angular_speed": 2, "angular_acceleration": 50}}
+    return trajcli.plan({**SQUARE, "limits": limits, "moves": [{**SQUARE["moves"][0], "segments": segments}]})
+
+
+@pytest.mark.parametrize("rate", [125, 500])
+def test_a_tool_that_goes_to_and_fro_is_known_by_how_it_is_turned(rate: int) -> None:
+    """It passes each place eight times, another way round: rows right beside a corner are on one side of it alone."""
+    made = to_and_fro(5e-4, 0.02, 8)
+    robot, rows, off = made.moves[0].robot, made.trajectory.sample(rate), np.full(6, 0.5e-9)
+    paths, resolution = {0: made.moves[0].planned.tool}, Resolution(0.5e-9, off, off, off)
+    moves = np.zeros(len(rows), int)
+    required = Requirements(robot, interpolate="hold", tool=lambda: ToolJudge(robot, paths))
+
+    def deviations(q: np.ndarray) -> list[tuple[int | None, float | None, str | None]]:
+        values = np.round(q, 9), None, None, None, None, moves, None, resolution, "rows"
+        found = judge_motion(lambda: [RecordedMotion(rows.t, *values)], required).findings
+        return [(each.row, each.value, each.quantity) for each in found if each.kind == "deviation"]
+
+    assert deviations(rows.q) == []
+    x = trajcli.load_robot("ur5e").fk(rows.q)[:, 0, 3] - 0.5
+    inside = np.flatnonzero(
+        (x > 2.2e-4) & (x < 2.8e-4)
+    )  # in the middle of the way: 5e-3 rad from other passes
+    for row in (inside[0], inside[-1]):
+        q = rows.q.copy()
+        q[row, 5] += 3e-5
+        assert deviations(q) == [(row + 1, pytest.approx(3e-5, rel=0.1), "orientation")]
 
 
 HALF_CIRCLE = """

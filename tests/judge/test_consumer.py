@@ -5,9 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from trajcli.consumers.judgement import judge_by_profile, load_profile
+from trajcli.consumers.rule_check import Surroundings
 from trajcli.job.robot import load_robot
 from trajcli.judge.consumer import ConsumerJudge
+from trajcli.kinematics.robot import unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 
@@ -50,3 +54,55 @@ def test_rest_breaks_no_rule() -> None:
     for first in range(1, 501, 100):
         judge.take(at_rest(100, first))
     assert judge.result()[0] == ()
+
+
+def cut(rows: RecordedMotion, low: int, high: int) -> RecordedMotion:
+    """Return the rows from one to another, as a block of a longer file."""
+    part = {name: getattr(rows, name) for name in ("t", "q", "qd", "qdd", "tau")}
+    return replace(
+        rows,
+        first_row=low + 1,
+        **{name: None if each is None else each[low:high] for name, each in part.items()},
+    )
+
+
+def broken(profile: str) -> RecordedMotion:
+    """Return rows that break rules of a profile, in their first row, their last one, and between."""
+    robot, period = load_robot("fr3"), 0.1 if profile == "ros-jtc" else 1e-3
+    q = np.tile([0.0, -0.3, 0.0, -2.0, 0.0, 1.8, 0.5], (31, 1))
+    qd, tau, fine = np.zeros_like(q), np.full_like(q, np.nan), np.full(7, 0.5e-9)
+    q[12, 3] -= 0.01
+    q[30, 5] += 0.02
+    qd[30, 1] = 0.4
+    tau[7, 2] = 500.0
+    resolution = Resolution(0.5e-9, fine, fine, fine)
+    t = 0.05 + period * np.arange(31)  # the arm has that long to come to the first row
+    return RecordedMotion(t, q, qd, np.zeros_like(q), None, tau, None, robot.joint_names, resolution, "-", 1)
+
+
+@pytest.mark.parametrize("profile", ["ros-jtc", "franka-fr3"])
+@pytest.mark.parametrize("named", [True, False])
+def test_all_rules_of_a_profile_judge_every_row(profile: str, named: bool) -> None:
+    """In blocks of many rows, of one and of none they find what they find in all rows at once, beside arm and start."""
+    robot, rows = load_robot("fr3"), broken(profile)
+    if not named:
+        rows = replace(rows, joints=tuple(f"joint{k}" for k in range(7)))
+    start = rows.q[0] + 0.6
+    whole = judge_by_profile(
+        [rows], load_profile(profile), Surroundings(robot.joint_names, start, robot.limits)
+    )
+    judge = ConsumerJudge(profile, robot, start)
+    for ends in ((0, 1), (1, 12), (12, 13), (13, 13), (13, 30), (30, 31)):
+        judge.take(cut(rows, *ends))
+    findings, notes = judge.result()
+    wanted = [(each.rule, each.joint, each.row, each.value, each.limit) for each in whole.findings]
+    assert [(each.rule, each.joint, each.row, each.value, each.limit) for each in findings] == wanted
+    assert len(notes) == len(whole.unjudged)
+    assert len(findings) > 3
+    rules = {each.rule for each in findings}
+    if profile == "ros-jtc":
+        assert {"jtc-first-point", "jtc-last-velocity", "jtc-effort"} <= rules
+        assert ("jtc-joint-names" in rules) is not named
+        bare = ConsumerJudge(profile, replace(robot, limits=unlimited(7)), start)
+        bare.take(rows)
+        assert len(bare.result()[0]) < len(findings)  # no limit says that the way from the start is too short

@@ -191,7 +191,5 @@ def test_rows_are_joined_as_a_profile_says_unless_somebody_says_otherwise(
         )
         judgement = check_file(str(tmp_path / "rows.csv"), options).judgement
         assert judgement.interpolation == joined
-        over = [
-            each.value for each in judgement.findings if (each.rule, each.kind) == ("limit", "velocity")
-        ]
+        over = [each.value for each in judgement.findings if (each.rule, each.kind) == ("limit", "velocity")]
         assert over == ([pytest.approx(peak)] if 0 < limit < peak else [])

@@ -86,7 +86,7 @@ def test_all_families_judge_once_each_and_are_those_of_their_modules() -> None:
         tcp=ToolLimits(0.5, 1.0),
     )
     found = dict(families(every))
-    assert list(found) == ["joints", "velocity_by_position", "effort", "tool"]
+    assert names(every) == list(found) == ["joints", "velocity_by_position", "effort", "tool"]
     assert all(isinstance(each, LimitFamily) and each is family(name) for name, each in found.items())
     assert len({type(each) for each in found.values()}) == 4
 

@@ -24,6 +24,7 @@ _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there
 _ROWS = 1024  # at a time
 _ASIDE = 1e-3  # of the distance of samples: what tells the sides of a corner apart
+_INSIDE = 1e-6  # of it: how far within a segment a place is still on its side of a corner
 _FURTHER = 2.0  # times the way of the tool from row to row: how far along the path it may get
 
 
@@ -138,8 +139,10 @@ class RecordedPath:
         beside = np.flatnonzero(exceeds(sizes, self._limits).any(axis=1))
         if not (beside.size and inner.size):
             return
-        corner = inner[np.abs(s[beside, None] - inner).argmin(axis=1)]
-        other = self._refined(np.clip(2.0 * corner - s[beside], 0.0, self._path.length), poses[beside])
+        corner = 1 + np.abs(s[beside, None] - inner).argmin(axis=1)
+        side = np.where(s[beside] < self._path.breaks[corner], 0, -1)  # the segment behind, or before it
+        within = self._path.breaks[corner + side], self._path.breaks[corner + side + 1]
+        other = self._refined(2.0 * self._path.breaks[corner] - s[beside], poses[beside], within)
         found = self._sizes(other, poses[beside])
         nearer = (found / self._limits).max(axis=1) < (sizes[beside] / self._limits).max(axis=1)
         s[beside[nearer]], sizes[beside[nearer]] = other[nearer], found[nearer]
@@ -154,31 +157,69 @@ class RecordedPath:
         )
         square = (own**2).sum(axis=1)[:, None] - 2.0 * own @ of_path.T + (of_path**2).sum(axis=1)
         if before is None:
-            s = self._s[self._followed(square, own, t)]
-        else:
-            far = np.abs(self._s - before[0][:, None]) > (self._slack + self._fast * before[1])[:, None]
-            s = self._s[np.where(far, np.inf, square).argmin(axis=1)]
-        return self._refined(s, poses)
+            return self._refined(self._s[self._followed(square, own, t, poses)], poses)
+        far = np.abs(self._s - before[0][:, None]) > (self._slack + self._fast * before[1])[:, None]
+        square[far] = np.inf
+        found = square.argmin(axis=1)
+        near = square <= square.min(axis=1)[:, None] + self._near
+        for k in np.flatnonzero(np.diff(near, prepend=False, axis=1).sum(axis=1) > 2).tolist():
+            places = self._on_path(np.flatnonzero(near[k]), square[k], poses[k])
+            found[k] = places[square[k, places].argmin()]
+        return self._refined(self._s[found], poses)
 
-    def _refined(self, s: Array, poses: Array) -> Array:
-        """Return the values of s (N,) at which the path is nearest to the tool, from values beside them."""
+    def _on_path(self, near: NDArray[np.intp], square: Array, pose: Array) -> NDArray[np.intp]:
+        """Return of samples that are as near those beside places where the tool is on the path, if any is.
+
+        Where a path comes back to a place, or goes to and fro, the orientation tells when it is there.
+
+        Args:
+            near: Their indices, increasing; neighbours are beside one place.
+            square: Squared distances from all samples.
+            pose: Of the tool, shape (4, 4).
+        """
+        groups = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
+        if len(groups) == 1:
+            return near
+        poses = np.broadcast_to(pose, (len(groups), 4, 4))
+        nearest = [group[square[group].argmin()] for group in groups]
+        off = (self._sizes(self._refined(self._s[nearest], poses), poses) / self._limits).max(axis=1)
+        return np.concatenate([groups[k] for k in np.flatnonzero(off <= max(1.0, off.min()))])
+
+    def _refined(self, s: Array, poses: Array, within: tuple[Array, Array] | None = None) -> Array:
+        """Return the values of s (N,) at which the path is nearest to the tool, from values beside them.
+
+        Args:
+            s: Shape (N,).
+            poses: Of the tool, shape (N, 4, 4).
+            within: Between which values each s stays, as on one side of a corner; None for the whole path.
+        """
         turning, step = self._path.poses.pure_rotation, self._path.length / _SAMPLES
-        both = np.clip(s + _ASIDE * np.array([[-step], [step]]), 0.0, self._path.length)
-        left, right = (
-            np.linalg.norm(self._apart(self._path.at_s(side, "right").poses, poses, turning=turning), axis=1)
-            for side in both
-        )
-        s = np.where(left < right, both[0], both[1])  # a corner has no slope: its sides are no step from it
+        low, high = (0.0, self._path.length) if within is None else within
+        if within is None:
+            s = self._beside_corner(s, poses)
+        else:
+            low, high = low + _INSIDE * step, high - _INSIDE * step
+            s = np.clip(s, low, high)
         for _ in range(_STEPS):
             reference = self._path.at_s(s, "right")
             slope = reference.first[:, 3:] if turning else reference.first[:, :3]
             apart = self._apart(reference.poses, poses, turning=turning)
             size = np.maximum((slope**2).sum(axis=1), 1e-300)
             change = np.clip((slope * apart).sum(axis=1) / size, -step, step)
-            s = np.clip(s + change, 0.0, self._path.length)
+            s = np.clip(s + change, low, high)
         return np.asarray(s)
 
-    def _followed(self, square: Array, own: Array, t: Array) -> NDArray[np.intp]:
+    def _beside_corner(self, s: Array, poses: Array) -> Array:
+        """Return values of s (N,) a little aside, on the nearer side: a corner itself has no slope."""
+        turning, step = self._path.poses.pure_rotation, self._path.length / _SAMPLES
+        both = np.clip(s + _ASIDE * np.array([[-step], [step]]), 0.0, self._path.length)
+        left, right = (
+            np.linalg.norm(self._apart(self._path.at_s(side, "right").poses, poses, turning=turning), axis=1)
+            for side in both
+        )
+        return np.where(left < right, both[0], both[1])
+
+    def _followed(self, square: Array, own: Array, t: Array, poses: Array) -> NDArray[np.intp]:
         """Return the indices of the nearest samples, each no further from the one before than the tool moves.
 
         A path may pass a place twice, or end where it starts: of the first row the earliest place counts, and
@@ -188,6 +229,7 @@ class RecordedPath:
             square: Squared distances of rows from samples, shape (N, samples).
             own: Coordinates of the rows, shape (N, d).
             t: Their times, s, shape (N,).
+            poses: Of the tool, shape (N, 4, 4).
         """
         found = np.empty(len(own), dtype=np.intp)
         for k, coordinates in enumerate(own):
@@ -203,6 +245,7 @@ class RecordedPath:
                 low, high = np.searchsorted(self._s, [at - reach, at + reach])
                 window = square[k, low : max(high, low + 1)]
                 near = low + np.flatnonzero(window <= window.min() + self._near)
+                near = self._on_path(near, square[k], poses[k])
                 onward = near[self._s[near] >= at]
                 near = onward if onward.size else near
                 found[k] = near[np.abs(self._s[near] - at - moved).argmin()]

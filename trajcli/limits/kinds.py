@@ -157,7 +157,7 @@ class LimitedMove:
         curve = self.trajectory.curve
         middles = curve.breaks[:-1] + curve.lengths / 2 - curve.start
         first, last = np.searchsorted(middles, [self.span.start, self.span.end]).tolist()
-        return first, first if self.span.duration == 0 else last
+        return first, last
 
     @property
     def pieces(self) -> tuple[Array, Array]:

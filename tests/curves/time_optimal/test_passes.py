@@ -261,7 +261,7 @@ def test_behind_a_slow_place_an_end_may_be_too_fast_for_every_start(at, over):
 def test_a_cap_within_rounding_of_what_the_end_needs_is_none_that_forbids_it():
     """The lower end of the set and the cap are the same number but for their rounding."""
     for at in (0.3, 0.7, 1.1):
-        cap = 2.0 - 2 * UP * (LENGTH - at) if 2.0 > 2 * UP * (LENGTH - at) else 0.25
+        cap = max(2.0 - 2 * UP * (LENGTH - at), 0.25)
         end = np.sqrt(cap + 2 * UP * (LENGTH - at))
         path = PiecewisePolynomial([0.0, LENGTH], np.array([1.0, 0.0])[:, None, None])
         demand = JointConstraint(path, symmetric(9.0), np.array([[-DOWN, UP]]))

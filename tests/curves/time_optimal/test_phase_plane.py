@@ -146,3 +146,48 @@ def test_what_was_known_of_unchanged_intervals_is_what_they_would_have(seed: int
     np.testing.assert_allclose(
         maximum_velocity_curve(after)[:-1], largest_in_intervals(P, R, lower, caps[:-1])
     )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_last_point_has_the_room_that_its_interval_leaves_for_y(seed: int) -> None:
+    """Largest y <= cap with P x + R y <= C for some x >= 0, of the last of two intervals."""
+    rng = np.random.default_rng(seed)
+    P, R = rng.normal(size=(2, 6, 2))
+    C, cap = rng.uniform(0.05, 1.0, (6, 2)), rng.uniform(0.5, 9.0, 3)
+    none, nothing = np.zeros(6, dtype=np.intp), (np.empty((0, 2)),) * 3
+    eased, turning = np.ones((1, 3)), np.zeros(3, dtype=bool)
+    rows = IntervalRows(np.arange(3.0), P, R, C, C, eased, cap, turning, none, none, nothing, nothing)
+    answers = [
+        linprog(objective, np.column_stack([P[:, k], R[:, k]]), C[:, k], bounds=bounds).x
+        @ -np.array(objective)
+        for k, objective, bounds in (
+            (0, [-1, 0], [(0, cap[0]), (0, None)]),
+            (1, [-1, 0], [(0, cap[1]), (0, None)]),
+            (1, [0, -1], [(0, None), (0, cap[2])]),
+        )
+    ]
+    np.testing.assert_allclose(maximum_velocity_curve(rows), answers, rtol=1e-7)
+
+
+def test_intervals_do_not_know_of_each_other() -> None:
+    """Of sixty times the same forty intervals each has the room that it has alone."""
+    rng = np.random.default_rng(7)
+    P, R, C = rng.normal(size=(6, 40)), rng.normal(size=(6, 40)), rng.uniform(0.05, 1.0, (6, 40))
+    cap = rng.uniform(0.5, 9.0, 40)
+    alone = [largest_in_intervals(P[:, [k]], R[:, [k]], C[:, [k]], cap[[k]])[0] for k in range(40)]
+    assert (alone < cap).sum() > 20
+    many = largest_in_intervals(*(np.tile(each, 60) for each in (P, R, C, cap)))
+    np.testing.assert_array_equal(many, np.tile(alone, 60))
+
+
+@pytest.mark.parametrize("above", [1e-2, 1e-4, 1e-7, 1e-9])
+def test_a_cap_a_little_above_the_room_does_not_hide_it(above: float) -> None:
+    """What there is room for without a cap there is with one that is nearly as low."""
+    rng = np.random.default_rng(11)
+    P, R, C = rng.normal(size=(6, 60)), rng.normal(size=(6, 60)), rng.uniform(0.05, 1.0, (6, 60))
+    room = largest_in_intervals(P, R, C, np.full(60, np.inf))
+    bounded = np.isfinite(room)
+    assert bounded.sum() > 30
+    P, R, C, room = P[:, bounded], R[:, bounded], C[:, bounded], room[bounded]
+    found = largest_in_intervals(P, R, C, room * (1 + above))
+    np.testing.assert_allclose(found, room, rtol=1e-11)

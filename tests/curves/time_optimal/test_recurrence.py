@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from topp_paths import random_bounds, spline
 
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal import recurrence as recurrence_module
 from trajcli.curves.time_optimal.collocation import interval_rows
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
-from trajcli.curves.time_optimal.passes import solve, solve_locally
+from trajcli.curves.time_optimal.passes import UnreachableSpeedError, solve, solve_locally
 
 
 def recurrence(P, R, C, chosen, limits):
@@ -66,7 +67,9 @@ def test_a_few_lowered_limits_change_the_solution_around_them(seed, end):
     assert 0 < (whole.x != before.x).sum() < grid.size / 2
 
 
-@pytest.mark.parametrize(("bounds", "place"), [([-1.0, 50.0], 990), ([-50.0, 1.0], 10)])
+@pytest.mark.parametrize(
+    ("bounds", "place"), [([-1.0, 50.0], 990), ([-50.0, 1.0], 10), ([-1.0, 1.0], 600), ([-1.0, 1.0], 400)]
+)
 def test_what_is_felt_far_away_is_not_found_locally(bounds, place):
     """A joint that brakes, or speeds up, nearly all the way: what changes at one end is felt to the other."""
     path = spline(np.array([[0.0], [1.0]]))
@@ -91,3 +94,42 @@ def test_what_chunks_abreast_leave_open_is_the_recurrence(monkeypatch, sweeps):
     found = recurrence_module.solve_recurrence(*steps, limits)
     np.testing.assert_array_equal(found, recurrence(*steps, limits))
     np.testing.assert_allclose(found[1:], 5.0 + np.cumsum(C), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("speed", "place"), [(np.inf, 0), (np.inf, -1), (0.3, 0), (0.3, -1), (np.inf, 3)])
+@pytest.mark.parametrize("lower", ["cap", "acceleration"])
+def test_limits_that_are_lowered_at_an_end_count_there_too(speed, place, lower):
+    """Surroundings that reach to an end of the path: the motion there is the same, or nothing is found locally."""
+    path = PiecewisePolynomial([0.0, 10.0], np.array([1.0, 0.0])[:, None, None])
+    demand = JointConstraint(path, np.array([[-0.5, 0.5]]), np.array([[-2.0, 3.0]]))
+    rows = interval_rows(np.linspace(0, 10, 1001), [demand], np.empty(0))
+    before = solve(rows, speed, speed)
+    factors = np.ones((2, 1000))
+    factors[int(lower == "acceleration"), place] = 1.5
+    lowered = rows.tightened(factors[0], factors[1:])
+    changed = (lowered.C != rows.C).any(axis=0) | (lowered.cap[1:] != rows.cap[1:])
+    changed |= lowered.cap[:-1] != rows.cap[:-1]
+    whole = solve(lowered, speed, speed)
+    if lower == "cap" and place in (0, -1):
+        assert whole.x[place] == pytest.approx(min(speed, 0.5 / 1.5) ** 2)
+    found = locally(lowered, before, changed)
+    moved = (whole.x != before.x)[[0, -1]].any() or whole.upper[-1] != before.upper[-1]
+    assert (found is None) == moved  # nothing is said of a motion whose end is another
+    for name in ("x", "upper", "mvc") if found is not None else ():
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
+
+
+@pytest.mark.parametrize("place", [0, -1])
+def test_a_speed_at_an_end_that_is_asked_for_is_not_lowered_locally(place):
+    """0.4 is more than the lowered cap of 1/3: nothing that is slower there is an answer."""
+    path = PiecewisePolynomial([0.0, 10.0], np.array([1.0, 0.0])[:, None, None])
+    demand = JointConstraint(path, np.array([[-0.5, 0.5]]), np.array([[-2.0, 3.0]]))
+    rows = interval_rows(np.linspace(0, 10, 1001), [demand], np.empty(0))
+    before = solve(rows, 0.4, 0.4)
+    factors = np.ones((2, 1000))
+    factors[0, place] = 1.5
+    lowered = rows.tightened(factors[0], factors[1:])
+    changed = (lowered.cap[1:] != rows.cap[1:]) | (lowered.cap[:-1] != rows.cap[:-1])
+    with pytest.raises(UnreachableSpeedError):
+        solve(lowered, *((0.4, 0.0), (0.0, 0.4))[place])
+    assert locally(lowered, before, changed) is None

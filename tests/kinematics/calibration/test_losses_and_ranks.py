@@ -1,11 +1,14 @@
-"""Losses by their derivative, and how far a parameter must differ from others to be determined."""
+"""Losses by their derivative, steps towards the least squares, and what of parameters is determined."""
 
 from __future__ import annotations
+
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from trajcli.kinematics.calibration.fit import _cost
+from trajcli.kinematics.calibration import fit as fit_module
+from trajcli.kinematics.calibration.fit import Fit, Options, _cost
 from trajcli.kinematics.calibration.identifiability import identifiability
 from trajcli.kinematics.calibration.parameters import ArmParameter
 
@@ -59,3 +62,66 @@ def test_a_parameter_that_does_little_is_determined_and_one_that_does_nothing_is
     found = identifiability(np.array([[1.0, 0.0], [0.0, size]]), TWO, 1.0)
     assert found.rank == rank
     assert [[share.parameter for share in shares] for shares in found.combinations] == [[TWO[1]]] * (2 - rank)
+
+
+class OneNumber:
+    """A problem of one parameter x: its robots are x, its residual a function of it."""
+
+    parameters, options = ("x",), Options(1.0)
+
+    def __init__(self, residual, slope):
+        self.residual, self.slope = residual, slope
+
+    def rows(self, x):
+        residuals, jacobian = np.zeros((1, 6)), np.zeros((1, 6, 1))
+        residuals[0, 0], jacobian[0, 0, 0] = self.residual(x), -self.slope(x)
+        return residuals, jacobian
+
+
+def descended(monkeypatch, residual, slope, start: float) -> Fit:
+    """Return the fit from a start by steps of Levenberg and Marquardt."""
+    monkeypatch.setattr(fit_module, "shifted", lambda x, _, step: x + float(step[0]))
+    problem = cast("Any", OneNumber(residual, slope))
+    begun = Fit(cast("Any", start), cast("Any", None), np.eye(1), 0, 0, np.ones(1), None, (), True)
+    return fit_module._descended(problem, begun, None)
+
+
+@pytest.mark.parametrize("start", [1.5, 3.0, -8.0, 200.0])
+def test_a_step_that_makes_it_worse_is_taken_back(start: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's steps for arctan x = 0 diverge from 1.3918 on: x - (1 + x^2) arctan x is further off, on the other side."""
+    fit = descended(monkeypatch, np.arctan, lambda x: 1 / (1 + x**2), start)
+    assert abs(float(cast("Any", fit.robot))) < 1e-9
+    assert fit.converged
+
+
+@pytest.mark.parametrize("start", [-2.0, 0.5])
+def test_residuals_that_no_parameters_make_least_are_no_end(
+    start: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """exp(-x) is less the larger x is: Newton's steps are all 1."""
+    fit = descended(monkeypatch, lambda x: np.exp(-x), lambda x: -np.exp(-x), start)
+    assert float(cast("Any", fit.robot)) == pytest.approx(start + fit.iterations, rel=1e-6)
+    assert fit.iterations > 20
+    assert not fit.converged
+
+
+def test_a_step_stays_in_what_is_determined() -> None:
+    """Of two residuals by two parameters alike there is the step along both: the least one is half for each."""
+    residuals, jacobian = np.zeros((1, 6)), np.zeros((1, 6, 2))
+    residuals[0, 0], jacobian[0, 0] = 3.0, [2.0, 2.0]
+    step = fit_module._step(residuals, jacobian, np.ones(1), np.eye(2), 0.0)
+    np.testing.assert_allclose(step, [0.75, 0.75])
+
+
+@pytest.mark.parametrize("damping", [1e-4, 0.1, 3.0])
+def test_a_damped_step_is_that_of_the_normal_equations(damping: float) -> None:
+    """(J^T W J + d s^2 I) step = J^T W r, with the largest singular value s of what is weighted."""
+    rng = np.random.default_rng(3)
+    residuals, jacobian = rng.normal(size=(7, 6)), rng.normal(size=(7, 6, 4))
+    weights, span = rng.uniform(0.1, 1.0, 7), rng.normal(size=(4, 3))
+    root = np.sqrt(weights)
+    J = (jacobian * root[:, None, None]).reshape(42, 4) @ span
+    r = (residuals * root[:, None]).reshape(42)
+    matrix = J.T @ J + damping * np.linalg.norm(J, 2) ** 2 * np.eye(3)
+    found = fit_module._step(residuals, jacobian, weights, span, damping)
+    np.testing.assert_allclose(found, np.linalg.solve(matrix, J.T @ r), rtol=1e-9)
