@@ -217,7 +217,7 @@ class RecordedPath:
             np.linalg.norm(self._apart(self._path.at_s(side, "right").poses, poses, turning=turning), axis=1)
             for side in both
         )
-        return np.where(left < right, both[0], both[1])
+        return np.asarray(np.where(left < right, both[0], both[1]))
 
     def _followed(self, square: Array, own: Array, t: Array, poses: Array) -> NDArray[np.intp]:
         """Return the indices of the nearest samples, each no further from the one before than the tool moves.

@@ -229,9 +229,15 @@ def test_speeds_at_the_ends_of_a_line_are_refused_from_the_largest_on(by):
     rows = interval_rows(np.linspace(0.0, short, 9), [demand], NOWHERE)
     start, end = np.sqrt(2 * DOWN * short), np.sqrt(2 * UP * short)
     solve(rows, start * (1 - by), 0.0), solve(rows, 0.0, end * (1 - by))
-    for speeds, allowed, place in (((start, 0.0), start, 0.0), ((0.0, end), end, short)):
+    later = np.sqrt(0.25 + 2 * UP * short)  # from 0.5 on
+    solve(rows, 0.5, later * (1 - by))
+    for speeds, allowed, place in (
+        ((start, 0.0), start, 0.0),
+        ((0.0, end), end, short),
+        ((0.5, later), later, short),
+    ):
         with pytest.raises(UnreachableSpeedError) as caught:
-            solve(rows, *(speed * (1 + by) for speed in speeds))
+            solve(rows, *(speed if speed == 0.5 else speed * (1 + by) for speed in speeds))
         assert caught.value.allowed == pytest.approx(allowed, rel=1e-9)
         assert caught.value.s == place
 

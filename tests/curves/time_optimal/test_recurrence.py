@@ -40,6 +40,16 @@ def test_both_ways_are_the_recurrence(monkeypatch, count, many, block):
     )
 
 
+@pytest.mark.parametrize("many", [0, 1000])
+def test_a_line_that_is_lowest_at_the_largest_value_only_counts(many, monkeypatch):
+    """From 2 on: of 1 and 2.4 - z the second is 0.4, below the limit of 0.5 behind; at 0.5 it would be 1.9."""
+    monkeypatch.setattr(recurrence_module, "_MANY", many)
+    P, C = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[1.0, 1.0], [2.4, 2.4]])
+    chosen = np.ones((2, 2), dtype=bool)
+    found = recurrence_module.solve_recurrence(P, np.ones((2, 2)), C, chosen, np.array([2.0, 0.5, 9.0]))
+    np.testing.assert_allclose(found, [2.0, 0.4, 1.0], rtol=1e-15)
+
+
 def locally(rows, before, changed):
     return solve_locally(rows, before, changed, maximum_velocity_curve(rows, before.mvc, changed))
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from trajcli.kinematics.calibration import uncertainty
-from trajcli.kinematics.calibration.fit import Fit, _Problem
+from trajcli.kinematics.calibration.fit import Fit, Options, _Problem
+from trajcli.kinematics.calibration.parameters import ArmParameter
 
 Pairs = list[tuple[int, int, float]]
 
@@ -116,3 +117,102 @@ def test_variances_are_by_kind_or_of_both_where_one_has_no_freedom() -> None:
     np.testing.assert_allclose(found((5, 30), [4.2, 4.0]), [2.5 / 19.8, 0.5 / 20])
     assert found((5, 5), [3.8, 3.9]) is None
     np.testing.assert_allclose(found((5, 5), [3.8, 3.9], (1e-3, 1e-3)), [1.0, 1.0])
+
+
+class LinearMeasurements:
+    """Measurements whose residuals and Jacobian are given, as those of a linear model."""
+
+    def __init__(
+        self, count: int, parameters: int, seed: int = 0, counts: tuple[int, int] | None = None
+    ) -> None:
+        rng = np.random.default_rng(seed)
+        self.residuals, self.jacobian = rng.normal(size=(count, 6)), rng.normal(size=(count, 6, parameters))
+        self.residuals[:, 3:] *= 0.03
+        self.counts = (3 * count, 3 * count) if counts is None else counts
+        for kind, number in enumerate(self.counts):
+            if not number:
+                self.residuals[:, 3 * kind : 3 * kind + 3] = self.jacobian[:, 3 * kind : 3 * kind + 3] = 0.0
+        self.deviations: np.ndarray | None = None
+
+    def differences(self, robot: object, parameters: object) -> tuple[np.ndarray, np.ndarray]:
+        return self.residuals, self.jacobian
+
+    def weights(self, length: float) -> np.ndarray:
+        if self.deviations is None:
+            return np.broadcast_to([1.0, 1.0, 1.0, length, length, length], self.residuals.shape)
+        return np.repeat(1.0 / self.deviations, 3, axis=1)
+
+
+NAMES = [ArmParameter(f"p{k}", "theta", k) for k in range(4)]
+
+
+def fit_of(made: LinearMeasurements, span: np.ndarray, combinations: object = (), released: int = 0) -> Fit:
+    """Return a fit with weights of a robust loss."""
+    weights = np.random.default_rng(9).uniform(0.3, 1.0, len(made.residuals))
+    nominal = SimpleNamespace(combinations=combinations)
+    parts = {"robot": None, "span": span, "weights": weights, "nominal": nominal, "released": released}
+    return cast("Any", SimpleNamespace(**parts))
+
+
+def by_pseudo_inverse(made: LinearMeasurements, fit: Fit, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the covariance of the parameters, and the variance of either kind of residual, row by row."""
+    weights = (made.weights(length) * np.sqrt(fit.weights)[:, None]).ravel()
+    rows = (made.jacobian.reshape(len(weights), -1) * weights[:, None]) @ fit.span
+    inverse = np.linalg.pinv(rows)
+    taken, squares = np.diag(rows @ inverse), (made.residuals.ravel() * weights) ** 2
+    kind = np.arange(len(weights)) % 6 // 3
+    variances = np.ones(2)
+    if made.deviations is None:
+        freedom = [made.counts[k] * fit.weights.mean() - taken[kind == k].sum() for k in range(2)]
+        variances = np.array(
+            [squares[kind == k].sum() / freedom[k] if made.counts[k] else 0.0 for k in range(2)]
+        )
+    mapped = fit.span @ inverse
+    return mapped @ np.diag(variances[kind]) @ mapped.T, variances
+
+
+@pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.parametrize("length", [1.0, 0.2])
+@pytest.mark.parametrize("counts", [None, (60, 0), (0, 60)])
+@pytest.mark.parametrize("rank", [4, 2])
+def test_deviations_are_those_of_the_pseudo_inverse(
+    rank: int, counts: tuple[int, int] | None, length: float, *, stated: bool
+) -> None:
+    """Of a linear model with weights, in which steps go in two or all four directions of four parameters."""
+    made = LinearMeasurements(20, 4, counts=counts)
+    if stated:
+        made.deviations = np.random.default_rng(2).uniform(0.5, 2.0, (20, 2))
+    span = np.random.default_rng(5).normal(size=(4, rank))
+    fit = fit_of(made, span)
+    found = uncertainty.uncertainty(fit, cast("Any", made), NAMES, Options(length))
+    wanted, variances = by_pseudo_inverse(made, fit, length)
+    np.testing.assert_allclose(cast("Any", found.deviations), np.sqrt(np.diag(wanted)), rtol=1e-9)
+    noise = [np.sqrt(variances[0]), np.sqrt(variances[1]) / length]
+    known = [None if stated or not made.counts[k] else pytest.approx(noise[k]) for k in range(2)]
+    assert list(found.noise) == known
+
+
+def test_what_no_combination_leaves_open_has_a_deviation() -> None:
+    """Of two combinations every parameter is open; after a release those that count are seen anew."""
+    shares = [[SimpleNamespace(parameter=NAMES[0])], [SimpleNamespace(parameter=NAMES[k]) for k in (1, 3)]]
+    made = LinearMeasurements(20, 4)
+    made.jacobian[:, :, 3] = 2.0 * made.jacobian[:, :, 2]
+
+    def held(combinations: object, released: int) -> list[bool]:
+        fit = fit_of(made, np.eye(4)[:, :3], combinations, released)
+        return [
+            each is not None
+            for each in uncertainty.uncertainty(fit, cast("Any", made), NAMES, Options(1.0)).deviations
+        ]
+
+    assert held(shares, 0) == [False, False, True, False]
+    assert held((), 0) == [True] * 4
+    assert held((), 1) == held(shares, 1) == [True, True, False, False]
+
+
+def test_without_freedom_nothing_is_known() -> None:
+    """Of three coordinates and three parameters nothing is left to tell the noise by."""
+    made = LinearMeasurements(1, 4, counts=(3, 0))
+    found = uncertainty.uncertainty(fit_of(made, np.eye(4)[:, :3]), cast("Any", made), NAMES, Options(1.0))
+    assert found.deviations == (None,) * 4
+    assert (found.noise, found.correlations) == ((None, None), ())

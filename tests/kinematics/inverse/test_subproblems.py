@@ -101,6 +101,15 @@ def test_a_turn_without_a_length_is_zero_and_noted() -> None:
     assert noted.rows.tolist() == [True, False]
 
 
+def test_what_is_noted_of_any_choice_stays_noted() -> None:
+    """Of two solutions of five poses: in the first one, in the second one, in both, in none; then another pose."""
+    noted = flags(5)
+    noted.note(np.array([[True, False, True, False, False], [False, True, True, False, False]]))
+    noted.note(np.zeros((2, 5), dtype=bool))
+    noted.note(np.array([False, False, False, True, False]))
+    assert noted.rows.tolist() == [True, True, True, True, False]
+
+
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_both_turns_to_a_level_reach_it(axis, sign: float) -> None:
@@ -129,7 +138,7 @@ def test_both_turns_to_a_level_reach_it(axis, sign: float) -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_level_out_of_reach_is_approached(side: float) -> None:
     """About z (1, 0, .) reaches from -1 to 1 along x; one at the end of that is a double solution, and noted."""
-    level = side * np.array([0.5, 1.0, 1.0 + 1e-13, 3.0, 1.0 - 1e-6])
+    level = side * np.array([0.5, 1.0, 1.0 + 1e-13, 3.0, 1.0 - 2e-7])
     noted = flags(5)
     turn, _ = levels((0.0, 0.0, 1.0), (1.0, 0.0, 0.7), (1.0, 0.0, 0.0), level, noted)
     np.testing.assert_allclose(np.broadcast_to(turn[0], (2, 5))[:, 1:4], side, atol=1e-6)
@@ -180,6 +189,19 @@ def test_both_pairs_of_turns_reach_the_aim(first, second, vector, sign: float) -
     stands = rotated(second, bend[0], np.array(vector))
     assert (sign * np.cross(first, stands) @ second >= -1e-9).all()
     assert not noted.rows.any()
+
+
+@pytest.mark.parametrize("kind", [Mirrored, Opposed])
+def test_angles_that_are_written_are_those_of_both_turns(kind) -> None:
+    """Also where an angle is none, half a turn, or one with a sine of -0."""
+    angles = np.array([0.3, -2.9, 3.1, -0.2, 0.0])
+    cosine, sine = turns(angles)
+    value, out = kind((np.append(cosine, [1.0, -1.0]), np.append(sine, [-0.0, -0.0]))), np.empty((2, 7))
+    value.write(out)
+    both = np.broadcast_arrays(*value.both())
+    np.testing.assert_allclose(np.exp(1j * out), both[0] + 1j * both[1], atol=1e-12)
+    assert (np.abs(out) <= np.pi).all()
+    assert out[0, 5:].tolist() == [0.0, np.pi]
 
 
 def axis(direction, point=(0.0, 0.0, 0.0)) -> ScrewAxis:
