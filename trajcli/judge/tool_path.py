@@ -163,8 +163,8 @@ class RecordedPath:
         found = square.argmin(axis=1)
         near = square <= square.min(axis=1)[:, None] + self._near
         for k in np.flatnonzero(np.diff(near, prepend=False, axis=1).sum(axis=1) > 2).tolist():
-            places = self._on_path(np.flatnonzero(near[k]), square[k], poses[k])
-            found[k] = places[square[k, places].argmin()]
+            passed = self._on_path(np.flatnonzero(near[k]), square[k], poses[k])
+            found[k] = passed[square[k, passed].argmin()]
         return self._refined(self._s[found], poses)
 
     def _on_path(self, near: NDArray[np.intp], square: Array, pose: Array) -> NDArray[np.intp]:

@@ -113,3 +113,22 @@ def test_one_limit_that_is_nearer_by_more_takes_over():
     curve = PiecewisePolynomial(np.arange(5.0), np.stack([halves, 0 * halves, 0 * halves]))
     found = switching_structure(curve, symmetric(99, 99), symmetric(1, 1))
     assert [(b.joint, b.start, b.end) for b in found] == [(0, 0.0, 2.0), (1, 2.0, 4.0)]
+
+
+@pytest.mark.parametrize(
+    ("shares", "wanted"),
+    [
+        (
+            [[0.97, 0.9], [0.946, 0.955]],
+            [(0, 0.0, 1.0), (1, 1.0, 2.0)],
+        ),  # what does not bind any more does not stay
+        ([[1.0, 0.1], [0.94, 0.1]], [(0, 0.0, 1.0)]),
+        ([[0.94, 0.1], [0.96, 0.1], [0.94, 0.1]], [(0, 1.0, 2.0)]),
+    ],
+)
+def test_a_limit_binds_no_longer_than_it_is_used(shares, wanted):
+    """To 95 of 100, whether another one is used as far or not."""
+    halves = 0.5 * np.array(shares)
+    curve = PiecewisePolynomial(np.arange(len(shares) + 1.0), np.stack([halves, 0 * halves, 0 * halves]))
+    found = switching_structure(curve, symmetric(99, 99), symmetric(1, 1))
+    assert [(b.joint, b.start, b.end) for b in found] == wanted

@@ -125,3 +125,38 @@ def test_a_damped_step_is_that_of_the_normal_equations(damping: float) -> None:
     matrix = J.T @ J + damping * np.linalg.norm(J, 2) ** 2 * np.eye(3)
     found = fit_module._step(residuals, jacobian, weights, span, damping)
     np.testing.assert_allclose(found, np.linalg.solve(matrix, J.T @ r), rtol=1e-9)
+
+
+class Location(fit_module._Problem):
+    """A problem of one number x: how far it is from each of some numbers."""
+
+    def __init__(self, numbers: np.ndarray, loss: Any) -> None:
+        self.numbers, self.options, self.parameters = numbers, Options(1.0, loss), []
+
+    def rows(self, robot: Any) -> tuple[np.ndarray, np.ndarray]:
+        residuals, jacobian = np.zeros((self.numbers.size, 6)), np.zeros((self.numbers.size, 6, 1))
+        residuals[:, 0], jacobian[:, 0, 0] = self.numbers - robot, 1.0
+        return residuals, jacobian
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("start", [-300.0, 0.5, 40.0])
+def test_the_scale_of_a_loss_is_that_of_the_residuals_it_ends_with(
+    loss: str, start: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever it starts: 1.5 medians of them, within a hundredth; the slopes of all losses add up to nothing."""
+    monkeypatch.setattr(fit_module, "shifted", lambda x, _, step: x + float(step[0]))
+    numbers = np.append(np.random.default_rng(6).normal(size=60), [30.0, 31.0, -5.0])
+    problem = Location(numbers, loss)
+    begun = Fit(cast("Any", start), cast("Any", None), np.eye(1), 0, 0, np.ones(63), None, (), True)
+    fit = fit_module._converged(problem, begun)
+    off = numbers - float(cast("Any", fit.robot))
+    scale = fit.loss_scale
+    assert scale is not None
+    assert scale == pytest.approx(1.5 * np.median(np.abs(off)), rel=0.0101)
+    ratio = np.abs(off) / scale
+    weights = 1.0 / (1.0 + ratio**2) if loss == "cauchy" else 1.0 / np.maximum(ratio, 1.0)
+    np.testing.assert_allclose(fit.weights, weights, rtol=1e-6)
+    assert abs((weights * off).sum()) < 1e-5
+    assert fit.outliers == tuple(np.flatnonzero(ratio > 3.0).tolist())
+    assert fit.converged

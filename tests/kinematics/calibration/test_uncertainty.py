@@ -210,6 +210,16 @@ def test_what_no_combination_leaves_open_has_a_deviation() -> None:
     assert held((), 1) == held(shares, 1) == [True, True, False, False]
 
 
+def test_a_parameter_that_outliers_alone_would_tell_is_not_known() -> None:
+    """The one measurement that it moves has no weight any more."""
+    made = LinearMeasurements(20, 4)
+    made.jacobian[1:, :, 3] = 0.0
+    fit = fit_of(made, np.eye(4)[:, :3], (), 1)
+    fit.weights[0] = 0.0
+    found = uncertainty.uncertainty(fit, cast("Any", made), NAMES, Options(1.0))
+    assert [each is not None for each in found.deviations] == [True, True, True, False]
+
+
 def test_without_freedom_nothing_is_known() -> None:
     """Of three coordinates and three parameters nothing is left to tell the noise by."""
     made = LinearMeasurements(1, 4, counts=(3, 0))
