@@ -37,7 +37,7 @@ def chain_with(moves: str) -> tuple[FlyByChain, float]:
     job = {"version": 1, "robot": "planar2r", "limits": LIMITS, "start": {"joints": [0.3, 1.2]}, "zone": 0.02}
     loaded = job_from_text(json.dumps({**job, "moves": MOVES[moves]}))
     plan = plan_job(job_from_text(json.dumps({**job, "zone": "stop", "moves": MOVES[moves]})))
-    courses = [move.planner.course(move.start.position, move.robot) for move in plan.moves]
+    courses = [move.planner.course(move.start.position, move.robot, move.planned) for move in plan.moves]
     zone = loaded.job.zone
     assert zone is not None
     around = ZoneAround(plan.moves[0].robot, plan.moves[0].planned.end.position, zone)

@@ -398,8 +398,13 @@ class Planner(Model):
         """Why no motion can fly by a corner of this move; None where it can."""
         return f"{self.tag} stops at its ends"
 
-    def course(self, start: Array, robot: Robot) -> Course:
-        """Return the move as joints along a path, from joint values (n,).
+    def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
+        """Return the move as joints along a path.
+
+        Args:
+            start: Joint values, (n,).
+            robot: Carries the limits within which it is flown.
+            planned: Its motion with stops at its ends.
 
         Raises:
             PlanningError: When the arm cannot follow.

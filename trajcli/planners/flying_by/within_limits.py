@@ -105,7 +105,7 @@ def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequenc
     kept = [k for k, move in enumerate(moves) if _has_length(move)]
     if len(kept) < 2:
         raise PlanningError("its moves have no length")
-    courses = [moves[k].planner.course(moves[k].start.position, robots[k]) for k in kept]
+    courses = [moves[k].planner.course(moves[k].start.position, robots[k], moves[k].planned) for k in kept]
     zones = [ZoneAround(robots[k], np.array(moves[k].planned.end.position), corners[k]) for k in kept[:-1]]
     ends = _rates_along(courses[0], moves[0].start), np.zeros(2)
     chain, parts, model = _within_limits(courses, zones, ends)

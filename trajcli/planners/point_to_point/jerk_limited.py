@@ -99,10 +99,11 @@ class JerkLimited(PointToPoint):
         }
         return next((reason for reason, holds in reasons.items() if holds), None)
 
-    def course(self, start: Array, robot: Robot) -> Course:
+    def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
         """Return the straight line in joint space to the target."""
         from trajcli.planners.joint_course import joint_line
 
+        del planned
         return joint_line(start, np.array(self.to.joints), robot)
 
     def within_tool_limits(self, start: State, robot: Robot) -> Planned | None:

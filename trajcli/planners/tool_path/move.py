@@ -163,7 +163,7 @@ class ToolPathMove(Planner):
         name = next(given, None)
         return None if name is None else f"its law has a `{name}`"
 
-    def course(self, start: Array, robot: Robot) -> Course:
+    def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
         """Return the joints along the path, from joint values (n,).
 
         Raises:
@@ -172,8 +172,9 @@ class ToolPathMove(Planner):
         """
         from trajcli.planners.tool_path.course import tool_course
 
-        planned = self._pinned_path(start, robot)
-        return tool_course(followed(robot, planned.path, start), self.law, self.tolerance.tolerance)
+        del planned
+        path = self._pinned_path(start, robot).path
+        return tool_course(followed(robot, path, start), self.law, self.tolerance.tolerance)
 
     @property
     def origin(self) -> Target | None:

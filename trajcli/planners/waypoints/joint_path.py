@@ -1,4 +1,4 @@
-"""Paths of joints through points: splines by their rule, and polylines with rounded corners."""
+"""Paths of joints through points: splines by their rule, polylines with rounded corners, paths of motions."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
+from trajcli.curves.splines.cubic import not_a_knot
 from trajcli.curves.splines.hermite import parabola_velocities
 from trajcli.curves.splines.shape_preserving import ShapeError
 from trajcli.curves.third_order.rounded_polyline import BESIDE, rounded_polyline
@@ -29,6 +30,9 @@ _STRAIGHT = 1e-12  # of the largest slope: segments whose slopes differ by less 
 _OFF = 1e-9  # relative: a velocity this little off the path is on it
 _PARABOLA_BESIDE = 1.0 / 8.0  # of the change of slope over the length of a blend
 _ROOM = 0.999  # of a segment that two blends may share: each keeps a straight piece between
+_AT_REST = 0.08  # of a motion's time, at each of its ends, in which s is not its time
+_PIECES, _PER_SEGMENT, _FEWEST = 48, 6, 2  # of the path of a motion: in all, on the mean and at least
+_FINE = 4001  # times of a motion, between which those of its knots are found
 
 
 @frozen
@@ -211,3 +215,44 @@ def _shrunk(wanted: Array, used: Array) -> tuple[Event, ...]:
     part = f"{100 * share.min():.4g} % of the deviation asked for"
     text = f"the corner at point {worst + 1} is rounded by {part}: its segments are too short for more{more}"
     return (Event("shrunk", text),)
+
+
+def path_of_motion(curve: PiecewisePolynomial, times: Array) -> tuple[PiecewisePolynomial, Array]:
+    """Return the path of a motion from rest to rest, q(s), and the s of some of its points.
+
+    It is a cubic spline through many of its points: at `times` exactly that motion, and near to it between.
+    Inside, s is the time, which goes on where all joints turn back at once. At rest, where q goes with the
+    third power of time, so does s: the path leaves its ends with a slope that is not zero.
+
+    Args:
+        curve: q(t) from t = 0.
+        times: At which points are passed, its start and its end among them, shape (m,).
+    """
+    fine = np.linspace(0.0, curve.end, _FINE)
+    passed, s = _slow_at_rest(times, curve.end), _slow_at_rest(fine, curve.end)
+    step = passed[-1] / max(_PIECES, _PER_SEGMENT * (times.size - 1))
+    knots, at_points = [times[:1]], [0]
+    for k, (low, high) in enumerate(pairwise(passed.tolist())):
+        count = max(_FEWEST, round((high - low) / step))
+        inner = np.interp(np.linspace(low, high, count + 1)[1:-1], s, fine)
+        knots += [inner, times[k + 1 : k + 2]]
+        at_points.append(at_points[-1] + count)
+    chosen = np.concatenate(knots)
+    values = _slow_at_rest(chosen, curve.end)
+    return not_a_knot(values, curve.evaluate(chosen)), values[at_points]
+
+
+def _slow_at_rest(times: Array, end: float) -> Array:
+    """Return a parameter that grows as time does, but next to 0 and to the end with its third power."""
+    width = _AT_REST * end
+    return np.asarray(times - _behind(times, width) + _behind(end - times, width) - _behind(end, width))
+
+
+def _behind(times: Array | float, width: float) -> Array:
+    """Return by what a parameter is behind the time once it has grown from 0: its rate rises to 1 in `width`.
+
+    The rate is 2 u^2 up to u = 1/2, and 1 - 2 (1 - u)^2 from there to u = 1.
+    """
+    u = np.minimum(np.asarray(times) / width, 1.0)
+    grown = np.where(u < 0.5, 2 * u**3 / 3, u - 0.5 + 2 * (1 - u) ** 3 / 3)
+    return np.asarray(width * (u - grown))

@@ -189,11 +189,12 @@ class TimeOptimal(ThroughPoints):
         }
         return next((reason for reason, holds in reasons.items() if holds), None)
 
-    def course(self, start: Array, robot: Robot) -> Course:
+    def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
         """Return the path through the points, from joint values (n,)."""
         from trajcli.planners.course import PassedPoints
         from trajcli.planners.joint_course import JointCourse
 
+        del planned
         points = self._untimed().waypoints(resting(start), robot)
         path = self._path(points, robot, smooth=True)
         passed = PassedPoints(path.s[1:-1], points.positions[1:-1], path.missed[1:-1])

@@ -31,6 +31,7 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.per_joint import flawed
 from trajcli.language.recorded import Recorded
+from trajcli.language.waypoints import Waypoint
 from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.planner import Certificate, Planned
 from trajcli.planners.waypoints.given_points import (
@@ -44,8 +45,10 @@ from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
 
 if TYPE_CHECKING:
+    from trajcli.planners.course import Course
     from trajcli.planners.fastest_through_points.problem import WaypointProblem
 
+_AT_REST = 1e-9  # of its peaks: a motion that starts with less stands
 _TIME = Number(Quantity("time"), "Shortest duration of a segment, s.", at_least=0.0)
 
 
@@ -109,12 +112,40 @@ class FastestThroughPoints(PointSequence):
     _known: Array | None = PrivateAttr(default=None)
 
     @property
-    def why_not_flown_by(self) -> str:
-        """Why no motion can fly by a corner of this move."""
-        return (
-            "its way between its points follows from its speeds at them, from rest to rest; a `time_optimal` "
-            "move through the same points can be flown by"
-        )
+    def why_not_flown_by(self) -> str | None:
+        """Why no motion can fly by a corner of this move; None where it can."""
+        last = self.listed[-1] if self.listed else None
+        between = self.listed if self.to is None else self.listed[:-1]
+        reasons = {
+            "its `minimum_durations` are given": self.minimum_durations is not None,
+            "it keeps to the polyline (`straight`), as `time_optimal` with `path: polyline` does, which can "
+            "be flown by": self.straight,
+            "it ends in motion": last is not None and _has_rates(last, of_zero=False),
+            "a point between gives its velocity or acceleration": any(
+                _has_rates(point, of_zero=True) for point in between if point is not last
+            ),
+        }
+        return next((reason for reason, holds in reasons.items() if holds), None)
+
+    def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
+        """Return the path of its motion from rest to rest.
+
+        Raises:
+            PlanningError: When it starts in motion.
+        """
+        from trajcli.planners.course import PassedPoints
+        from trajcli.planners.joint_course import JointCourse
+        from trajcli.planners.waypoints.joint_path import path_of_motion
+
+        del start
+        passed, first = planned.via_points, planned.curve.evaluate_orders(np.zeros(1), (1, 2))[0]
+        peaks = [np.abs(planned.curve.piece_ends(order)).max() for order in (1, 2)]
+        if passed is None or (np.abs(first).max(axis=1) > _AT_REST * np.array(peaks)).any():
+            message = "a `waypoints` move that starts in motion has no path to follow at another pace"
+            raise PlanningError(message)
+        curve, s = path_of_motion(planned.curve, passed.times)
+        between = PassedPoints(s[1:-1], passed.points[1:-1], passed.missed[1:-1])
+        return JointCourse(curve, robot, between)
 
     @model_validator(mode="after")
     def _points_fit(self) -> FastestThroughPoints:
@@ -157,7 +188,7 @@ class FastestThroughPoints(PointSequence):
     def searched_from(self, planned: Planned) -> Self:
         """Return the planner that searches from the states of a motion at the points, and from no others."""
         copy, passed = self.model_copy(), planned.via_points
-        if passed is not None:
+        if passed is not None and not planned.parts:  # what flies by a corner passes not all of its points
             rates = (planned.curve.evaluate(passed.times, order) for order in (1, 2))
             copy._known = np.stack([*rates], axis=2)  # noqa: SLF001
         return copy
@@ -213,6 +244,12 @@ class FastestThroughPoints(PointSequence):
             message = f"{len(least)} minimum durations, but the recorded points make {wanted} segments"
             raise PlanningError(message, hint="give one for each segment, the first from the start")
         return given_points(start, recorded, list(zip(paths, listed, strict=True)), least)
+
+
+def _has_rates(point: Waypoint, *, of_zero: bool) -> bool:
+    """Return whether a point gives a velocity or an acceleration, `of_zero` or another one."""
+    given = [values for values in (point.velocity, point.acceleration) if values is not None]
+    return any(of_zero or any(values) for values in given)
 
 
 def _problem(points: GivenPoints, robot: Robot, joints: NDArray[np.intp]) -> WaypointProblem:
