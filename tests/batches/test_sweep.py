@@ -191,13 +191,31 @@ moves:
 """
 
 
-def test_what_a_search_through_zones_finds_is_no_bound(job: str) -> None:
-    """With stops it is the sum of both: d / v + v / a + a / j each. Through the zone it is faster than that."""
-    Path(job).write_text(CORNER, "utf-8")
+BEHIND = """\
+  - {planner: hold, duration: 0.5}
+  - {planner: jerk_limited, to: {joints: [0, 0]}}
+"""
+
+
+def test_moves_between_zones_are_bounded_as_one_and_others_each_by_itself(job: str) -> None:
+    """With stops it is the sum of all: d / v + v / a + a / j each. Through the zone it is faster than that.
+
+    There each joint still needs d / v + v / a from rest to rest, without limits of jerk.
+    """
+    Path(job).write_text(CORNER + BEHIND, "utf-8")
     flown, stopped = (row.point for row in table_of(swept(job, "moves.0.zone={joints: 5},stop")).rows)
-    assert stopped.bound == pytest.approx(2 * (30 / 90 + 90 / 360 + 360 / 36000), rel=1e-9)
+    alone = 30 / 90 + 90 / 360 + 360 / 36000
+    assert stopped.bound == pytest.approx(3 * alone + 0.5, rel=1e-9)
     assert flown.duration < stopped.bound
-    assert flown.bound is None
+    assert 30 / 90 + 90 / 360 < flown.bound - alone - 0.5 < flown.duration - alone - 0.5
+
+
+def test_where_moves_stop_although_they_name_a_zone_nothing_bounds_those_that_do_not(job: str) -> None:
+    """Rows of 1 s, to which each move is stretched, leave nothing to gain."""
+    slow = CORNER.replace("{joints: 5}", "{joints: 1e-9}") + "output: {rate: 1, align: true}\n"
+    Path(job).write_text(slow, "utf-8")
+    (point,) = (row.point for row in table_of(swept(job, "limits.velocity=90")).rows)
+    assert (point.verdict, point.bound) == ("verified", None)
 
 
 @pytest.mark.full

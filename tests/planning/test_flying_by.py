@@ -466,54 +466,6 @@ def test_a_time_optimal_move_is_flown_by_at_its_ends_and_passes_its_points():
     assert findings(plan, [plan.moves[0], changed, plan.moves[2]]) == {"waypoint"}
 
 
-def on_straight(q: np.ndarray, *corners: tuple[float, ...]) -> np.ndarray:
-    """Return how far joints (m, n) are from a polyline in joint space, rad, (m,)."""
-    gaps = []
-    for first, last in itertools.pairwise(corners):
-        step = np.subtract(last, first)
-        if not step.any():
-            continue
-        along = np.clip((q - first) @ step / (step @ step), 0, 1)
-        gaps.append(np.linalg.norm(q - first - along[:, None] * step, axis=1))
-    return np.min(gaps, axis=0)
-
-
-WAYS = {
-    "between joint moves": [(1.0, 1.6), (0.8, 1.9), (0.6, 2.2)],
-    "there and back": [(1.0, 1.6), CORNER],
-    "one joint turns back": [(1.1, 1.25), (1.0, 1.25)],
-    "no point between": [(0.6, 2.2)],
-}
-
-
-@pytest.mark.parametrize("name", few(list(WAYS), 1))
-def test_waypoints_are_flown_by_at_their_ends_and_pass_their_points(name):
-    *inner, last = WAYS[name]
-    through = [{"joints": list(point)} for point in inner]
-    waypoints = {"planner": "waypoints", "through": through, "to": {"joints": list(last)}}
-    plan = flown(to(*CORNER), waypoints, to(0.2, 2.0))
-    assert len(plan.flyby.zones) == 2
-    assert plan.flyby.duration < 0.95 * plan.flyby.stopping
-    assert plan.flyby.second_order < plan.flyby.duration
-    curve, spans = plan.trajectory.curve, plan.trajectory.spans
-    times = np.linspace(0, curve.end, int(curve.end * 1e4))
-    for order, limit in ((1, 3.0), (2, 8.0), (3, 60.0)):
-        assert np.abs(curve.evaluate(times, order)).max() <= limit * (1 + 1e-9)
-    for order in range(3):
-        first, ended = curve.piece_ends(order)
-        assert np.abs(first[1:] - ended[:-1]).max() <= 1e-9 * max(1.0, np.abs(ended).max())
-    own = times[(times >= spans[1].start) & (times <= spans[1].end)]
-    for point in inner:
-        assert np.linalg.norm(curve.evaluate(own) - point, axis=1).min() < 2e-4
-    before, behind = plan.flyby.zones
-    outside = (times < before.entered) | (times > behind.left)
-    assert on_straight(curve.evaluate(times[outside]), START["joints"], CORNER, last, (0.2, 2.0)).max() < 1e-9
-    for zone, corner in ((before, CORNER), (behind, last)):
-        inside = times[(times >= zone.entered) & (times <= zone.left)]
-        off = np.linalg.norm(pose(curve.evaluate(inside)) - pose(np.array([corner])), axis=1)
-        assert off.max() <= 0.02 * (1 + 1e-6)
-
-
 @pytest.mark.full
 @pytest.mark.parametrize(
     "second",

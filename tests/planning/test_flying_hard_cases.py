@@ -170,45 +170,6 @@ def test_a_path_that_stops_at_its_corner_is_flown_by_at_its_ends(stop):
     assert np.abs(plan.trajectory.curve.evaluate(times[nearest], 1)).max() < 1e-2
 
 
-def test_waypoints_along_a_polyline_say_what_can_be_flown_by_in_their_place():
-    """What they advise is followed."""
-    points = {"through": [{"joints": [0.8, 1.5]}], "to": {"joints": [1.0, 1.6]}}
-    moves = [to(0.6, 1.3, zone=0.02), {"planner": "waypoints", "straight": True, **points}, to(1.2, 2.0)]
-    with pytest.raises(InputError, match="as `time_optimal` with `path: polyline` does") as caught:
-        planned(*moves, zone="stop")
-    (problem,) = caught.value.problems
-    assert problem.place is not None
-    assert '"zone"' in problem.place.source
-    stopped = planned(*(moves[0] | {"zone": "stop"}, *moves[1:]))
-    assert any("`time_optimal`" in remark.message for remark in stopped.remarks)
-    moves[1] = {"planner": "time_optimal", "path": "polyline", **points}
-    assert len(planned(*moves, zone="stop").flyby.zones) == 1
-
-
-@pytest.mark.parametrize(
-    ("fields", "reason"),
-    [
-        ({"minimum_durations": [0.1, 0.1]}, "its `minimum_durations` are given"),
-        ({"through": [{"joints": [0.8, 1.5], "velocity": [0.1, 0]}]}, "a point between gives its velocity"),
-        ({"to": {"joints": [1.0, 1.6], "velocity": [0.1, 0]}}, "it ends in motion"),
-    ],
-)
-def test_waypoints_whose_speeds_are_given_stop_at_their_ends(fields, reason):
-    points = {"through": [{"joints": [0.8, 1.5]}], "to": {"joints": [1.0, 1.6]}}
-    moves = [to(0.6, 1.3, zone=0.02), {"planner": "waypoints", **points, **fields}, to(1.2, 2.0)]
-    with pytest.raises(InputError, match=reason):
-        planned(*moves, zone="stop")
-
-
-def test_waypoints_that_start_in_motion_are_planned_as_without_zones():
-    points = {"through": [{"joints": [0.8, 1.5]}], "to": {"joints": [1.0, 1.6]}}
-    moving = {"start": {"joints": [0.6, 1.3], "velocity": [0.1, 0]}}
-    plan = planned({"planner": "waypoints", **points}, to(1.2, 2.0), **moving)
-    (event,) = (event for event in plan.events if event.kind == "not_faster")
-    assert "starts in motion" in event.message
-    assert plan.flyby.duration == plan.flyby.stopping
-
-
 def test_an_explicit_zone_that_cannot_be_is_refused_before_any_move_is_planned():
     """That the second move is out of reach only planning tells."""
     far = {"planner": "line", "to": {"xyz": [9, 0, 0]}, **FASTEST}

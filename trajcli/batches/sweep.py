@@ -165,11 +165,17 @@ def _planned(document: Document) -> SweepPoint:
 def _bound(plan: Plan) -> float | None:
     """Return a duration that no motion of the job is below; None where none is known.
 
-    Through zones the search knows one that proves nothing, and a proof takes seconds for each point.
+    Through zones it is the one without most limits of jerk: a closer one takes seconds for each point.
     """
-    if plan.flyby is not None and plan.flyby.zones:
+    chains = () if plan.flyby is None else plan.flyby.chains
+    if chains is None:
         return None
-    bounds = [_bound_of_move(move) for move in plan.moves if move.duration > 0]
+    flown = {index for chain in chains for index in chain.moves}
+    bounds = [_bound_of_move(move) for move in plan.moves if move.duration > 0 and move.index not in flown]
+    if chains:
+        from trajcli.planners.flying_by import second_order_bound
+
+        bounds += map(second_order_bound, chains)
     return None if None in bounds else math.fsum(bound for bound in bounds if bound is not None)
 
 

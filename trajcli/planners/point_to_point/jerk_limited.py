@@ -103,7 +103,6 @@ class JerkLimited(PointToPoint):
         """Return the straight line in joint space to the target."""
         from trajcli.planners.joint_course import joint_line
 
-        del planned
         return joint_line(start, np.array(self.to.joints), robot)
 
     def within_tool_limits(self, start: State, robot: Robot) -> Planned | None:
