@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.curves.linear_systems import solve_block_tridiagonal
+from trajcli.curves.linear_systems import cyclic_factors, solve_block_tridiagonal
 
 
 def system(seed, blocks, size):
@@ -28,6 +28,10 @@ def test_as_dense(blocks, size):
     before = diagonal.copy(), right.copy()
     found = solve_block_tridiagonal(diagonal, right, values)
     np.testing.assert_allclose(found, np.linalg.solve(dense, values), rtol=1e-9, atol=1e-9)
+    factors = cyclic_factors(diagonal, right)
+    for again in (values, -2.0 * values):
+        found = factors.solve(again.reshape(blocks, size)).reshape(-1)
+        np.testing.assert_allclose(found, np.linalg.solve(dense, again), rtol=1e-9, atol=1e-9)
     for kept, given in zip(before, (diagonal, right), strict=True):
         np.testing.assert_array_equal(kept, given)
 

@@ -162,11 +162,11 @@ class _Level:
     """What eliminating every other block leaves behind.
 
     Attributes:
-        inverse: Of the odd blocks, shape (k, 4, 4).
-        before: From each even block to the odd one after it, shape (k, 4, 4).
-        after: From each odd block to the even one after it, shape (l, 4, 4).
-        down: before times inverse, shape (k, 4, 4).
-        up: Transposed after times inverse, shape (l, 4, 4).
+        inverse: Of the odd blocks, shape (i, k, k).
+        before: From each even block to the odd one after it, shape (i, k, k).
+        after: From each odd block to the even one after it, shape (j, k, k).
+        down: before times inverse, shape (i, k, k).
+        up: Transposed after times inverse, shape (j, k, k).
     """
 
     inverse: Array
@@ -177,37 +177,23 @@ class _Level:
 
 
 @frozen
-class BlockFactors:
-    """The factored matrix.
+class CyclicFactors:
+    """A symmetric matrix of blocks beside its diagonal, factored for any number of right sides.
 
     Attributes:
-        diagonal: Its blocks A[i, i], shape (b, 2, 2).
-        right: Its blocks A[i, i + 1], shape (b - 1, 2, 2).
         levels: From the finest on.
-        rest: Inverse of the last block, shape (1, 4, 4).
+        rest: Inverse of the last block, shape (1, k, k).
     """
 
-    diagonal: Array
-    right: Array
     levels: tuple[_Level, ...]
     rest: Array
 
     def solve(self, values: Array) -> Array:
-        """Return x, shape (b, 2), with A x = values, shape (b, 2); the residual gives lost digits back."""
-        x = self._solution(values)
-        residual = values - _applied(self.diagonal, x)
-        residual[:-1] -= _applied(self.right, x[1:])
-        residual[1:] -= _applied(np.swapaxes(self.right, 1, 2), x[:-1])
-        return np.asarray(x + self._solution(residual))
-
-    def _solution(self, values: Array) -> Array:
-        blocks = len(values)
-        joined = np.zeros((2 * ((blocks + 1) // 2), 2))
-        joined[:blocks] = values
-        return self._solved(joined.reshape(-1, 4, 1), 0).reshape(-1, 2)[:blocks]
+        """Return x, shape (b, k), with A x = values, shape (b, k)."""
+        return self._solved(values[..., None], 0)[..., 0]
 
     def _solved(self, right: Array, depth: int) -> Array:
-        """Return the solution (b, 4, 1) from one level on."""
+        """Return the solution (b, k, 1) from one level on."""
         if depth == len(self.levels):
             return np.asarray(self.rest @ right)
         level = self.levels[depth]
@@ -223,15 +209,17 @@ class BlockFactors:
         return result
 
 
-def block_factors(diagonal: Array, right: Array) -> BlockFactors:
-    """Return the factors of a matrix.
+def cyclic_factors(diagonal: Array, right: Array) -> CyclicFactors:
+    """Return the factors of a symmetric matrix.
 
     Args:
-        diagonal: Blocks A[i, i], shape (b, 2, 2).
-        right: Blocks A[i, i + 1], shape (b - 1, 2, 2).
+        diagonal: Blocks A[i, i], shape (b, k, k).
+        right: Blocks A[i, i + 1], shape (b - 1, k, k).
+
+    Raises:
+        LinAlgError: When a block that is eliminated is singular.
     """
-    blocks, links = _paired(diagonal, right)
-    levels = []
+    blocks, links, levels = diagonal, right, []
     while len(blocks) > 1:
         inverse, before, after = _inverse(blocks[1::2]), links[0::2], links[1::2]
         down, up = before @ inverse, np.swapaxes(after, 1, 2) @ inverse[: len(after)]
@@ -240,7 +228,46 @@ def block_factors(diagonal: Array, right: Array) -> BlockFactors:
         kept[1 : 1 + len(after)] -= up @ after
         levels.append(_Level(inverse, before, after, down, up))
         blocks, links = kept, -(down[: len(after)] @ after)
-    return BlockFactors(diagonal, right, tuple(levels), _inverse(blocks))
+    return CyclicFactors(tuple(levels), _inverse(blocks))
+
+
+@frozen
+class BlockFactors:
+    """The factored matrix.
+
+    Attributes:
+        diagonal: Its blocks A[i, i], shape (b, 2, 2).
+        right: Its blocks A[i, i + 1], shape (b - 1, 2, 2).
+        pairs: Of its blocks, two by two.
+    """
+
+    diagonal: Array
+    right: Array
+    pairs: CyclicFactors
+
+    def solve(self, values: Array) -> Array:
+        """Return x, shape (b, 2), with A x = values, shape (b, 2); the residual gives lost digits back."""
+        x = self._solution(values)
+        residual = values - _applied(self.diagonal, x)
+        residual[:-1] -= _applied(self.right, x[1:])
+        residual[1:] -= _applied(np.swapaxes(self.right, 1, 2), x[:-1])
+        return np.asarray(x + self._solution(residual))
+
+    def _solution(self, values: Array) -> Array:
+        blocks = len(values)
+        joined = np.zeros((2 * ((blocks + 1) // 2), 2))
+        joined[:blocks] = values
+        return self.pairs.solve(joined.reshape(-1, 4)).reshape(-1, 2)[:blocks]
+
+
+def block_factors(diagonal: Array, right: Array) -> BlockFactors:
+    """Return the factors of a matrix.
+
+    Args:
+        diagonal: Blocks A[i, i], shape (b, 2, 2).
+        right: Blocks A[i, i + 1], shape (b - 1, 2, 2).
+    """
+    return BlockFactors(diagonal, right, cyclic_factors(*_paired(diagonal, right)))
 
 
 def _paired(diagonal: Array, right: Array) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from trajcli.curves.linear_systems import cyclic_factors
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 
@@ -165,13 +166,7 @@ class _Newton:
         across = blocks[:, :, left, :, right].reshape(segments, size, size)
         diagonal = last[:-1] + first[1:]
         diagonal[:, range(size), range(size)] += self._programme.weight
-        self._across = across[1:-1]
-        self._inverses: list[Array] = []
-        for k in range(segments - 1):
-            block = diagonal[k]
-            if k:
-                block = block - self._across[k - 1].T @ self._inverses[-1] @ self._across[k - 1]
-            self._inverses.append(np.linalg.inv(block))
+        self._points = cyclic_factors(diagonal, across[1:-1])
 
     def solve(self, right: Array) -> Array:
         """Return the solution for a right side."""
@@ -180,22 +175,12 @@ class _Newton:
         x, s = programme.split(right)
         ends = -(self._s_gain @ s[..., None]).reshape(segments, joints, 2 * _ENDS)
         unknowns = (x[1:-1] + ends[:-1, :, _ENDS:] + ends[1:, :, :_ENDS]).reshape(segments - 1, -1)
-        inner = self._points(unknowns).reshape(segments - 1, joints, _ENDS)
-        x_answer = np.pad(inner, ((1, 1), (0, 0), (0, 0)))
+        x_answer = np.zeros((segments + 1, joints, _ENDS))
+        x_answer[1:-1] = self._points.solve(unknowns).reshape(segments - 1, joints, _ENDS)
         both = np.concatenate([x_answer[:-1], x_answer[1:]], axis=2)
         along = (both.reshape(segments, 1, -1) @ self._coupling)[:, 0]
         s_answer = (self._s_inverse @ (s - along)[..., None])[..., 0]
         return np.concatenate([x_answer.ravel(), s_answer.ravel()])
-
-    def _points(self, constants: Array) -> Array:
-        """Return the solution of the block-tridiagonal system."""
-        rows = [constants[0]] if len(constants) else []
-        for k in range(1, len(constants)):
-            rows.append(constants[k] - self._across[k - 1].T @ (self._inverses[k - 1] @ rows[-1]))
-        for k in range(len(constants) - 1, -1, -1):
-            right = rows[k] - self._across[k] @ rows[k + 1] if k + 1 < len(constants) else rows[k]
-            rows[k] = self._inverses[k] @ right
-        return np.array(rows).reshape(constants.shape)
 
 
 def _newton(programme: SegmentProgramme, scale: Array) -> _Newton | _WholeNewton:
