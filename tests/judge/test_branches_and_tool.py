@@ -247,9 +247,12 @@ def to_and_fro(way: float, turn: float, passes: int) -> PlannedJob:
     return trajcli.plan({**SQUARE, "limits": limits, "moves": [{**SQUARE["moves"][0], "segments": segments}]})
 
 
-@pytest.mark.parametrize("rate", [125, 500])
+@pytest.mark.parametrize("rate", [8, 20, 125, 500])
 def test_a_tool_that_goes_to_and_fro_is_known_by_how_it_is_turned(rate: int) -> None:
-    """It passes each place eight times, another way round: rows right beside a corner are on one side of it alone."""
+    """It passes each place eight times, another way round: rows right beside a corner are on one side of it alone.
+
+    From one row to the next it gets no further than one millimetre, past none of the corners or past several.
+    """
     made = to_and_fro(5e-4, 0.02, 8)
     robot, rows, off = made.moves[0].robot, made.trajectory.sample(rate), np.full(6, 0.5e-9)
     paths, resolution = {0: made.moves[0].planned.tool}, Resolution(0.5e-9, off, off, off)
@@ -266,7 +269,7 @@ def test_a_tool_that_goes_to_and_fro_is_known_by_how_it_is_turned(rate: int) -> 
     inside = np.flatnonzero(
         (x > 2.2e-4) & (x < 2.8e-4)
     )  # in the middle of the way: 5e-3 rad from other passes
-    for row in (inside[0], inside[-1]):
+    for row in inside[[0, -1]] if rate > 100 else ():
         q = rows.q.copy()
         q[row, 5] += 3e-5
         assert deviations(q) == [(row + 1, pytest.approx(3e-5, rel=0.1), "orientation")]

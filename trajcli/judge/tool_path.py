@@ -23,8 +23,9 @@ from trajcli.limits.tolerances import exceeds
 _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there
 _ROWS = 1024  # at a time
-_ASIDE = 1e-3  # of the distance of samples: what tells the sides of a corner apart
-_INSIDE = 1e-6  # of it: how far within a segment a place is still on its side of a corner
+_INSIDE = (
+    1e-6  # of the distance of samples: how far within a segment a place is still on its side of a corner
+)
 _FURTHER = 2.0  # times the way of the tool from row to row: how far along the path it may get
 
 
@@ -195,9 +196,7 @@ class RecordedPath:
         """
         turning, step = self._path.poses.pure_rotation, self._path.length / _SAMPLES
         low, high = (0.0, self._path.length) if within is None else within
-        if within is None:
-            s = self._beside_corner(s, poses)
-        else:
+        if within is not None:
             low, high = low + _INSIDE * step, high - _INSIDE * step
             s = np.clip(s, low, high)
         for _ in range(_STEPS):
@@ -208,16 +207,6 @@ class RecordedPath:
             change = np.clip((slope * apart).sum(axis=1) / size, -step, step)
             s = np.clip(s + change, low, high)
         return np.asarray(s)
-
-    def _beside_corner(self, s: Array, poses: Array) -> Array:
-        """Return values of s (N,) a little aside, on the nearer side: a corner itself has no slope."""
-        turning, step = self._path.poses.pure_rotation, self._path.length / _SAMPLES
-        both = np.clip(s + _ASIDE * np.array([[-step], [step]]), 0.0, self._path.length)
-        left, right = (
-            np.linalg.norm(self._apart(self._path.at_s(side, "right").poses, poses, turning=turning), axis=1)
-            for side in both
-        )
-        return np.asarray(np.where(left < right, both[0], both[1]))
 
     def _followed(self, square: Array, own: Array, t: Array, poses: Array) -> NDArray[np.intp]:
         """Return the indices of the nearest samples, each no further from the one before than the tool moves.

@@ -92,6 +92,23 @@ def test_what_is_felt_far_away_is_not_found_locally(bounds, place):
     assert locally(lowered, before, (lowered.C != rows.C).any(axis=0)) is None
 
 
+@pytest.mark.parametrize("place", range(128, 148))
+def test_braking_that_is_felt_up_to_the_second_point_is_not_found_locally(place):
+    """The motion brakes nearly all the way: surroundings that begin at any of the first points differ there."""
+    path = spline(np.array([[0.0], [1.0]]))
+    demand = JointConstraint(path, np.array([[-9.0, 9.0]]), np.array([[-1.0, 50.0]]))
+    rows = interval_rows(np.linspace(0, 1, 1001), [demand], np.empty(0))
+    factors = np.ones((2, 1000))
+    factors[1, place] = 1.5
+    before = solve(rows, 0.0, 0.0)
+    lowered = rows.tightened(factors[0], factors[1:])
+    changed = (lowered.C != rows.C).any(axis=0)
+    whole, found = solve(lowered, 0.0, 0.0), locally(lowered, before, changed)
+    assert (whole.upper[1:100] < before.upper[1:100]).all()
+    for name in ("x", "upper", "mvc") if found is not None else ():
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
+
+
 @pytest.mark.parametrize("sweeps", [1, 3, 50])
 def test_what_chunks_abreast_leave_open_is_the_recurrence(monkeypatch, sweeps):
     """Sums from the first value on: no chunk is right before the one in front of it is."""

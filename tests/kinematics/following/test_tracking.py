@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import FixedOrientation, TangentOrientation
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
-from trajcli.kinematics.following.follower import follower
+from trajcli.kinematics.following import tracking
+from trajcli.kinematics.following.follower import LostError, follower
 from trajcli.kinematics.following.tolerance import Tolerance, probes, tolerance_ratio
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.following.tracking import StuckError, track_branch
@@ -160,3 +162,100 @@ def test_a_tolerance_finer_than_rounding_is_met_as_far_as_rounding_lets_it():
     exact = arm.exact(s, "right", coarse.evaluate(s))
     assert np.abs(curve.evaluate(s) - exact[0]).max() < 1e-12
     assert curve.pieces < 1000
+
+
+LENGTH = 2.0
+
+
+class Given:
+    """A follower whose references are given functions of s and side; it knows no joints."""
+
+    length = LENGTH
+
+    def __init__(self, **functions):
+        self.functions = functions
+
+    def reference_at(self, s, side):
+        s = np.asarray(s)
+        none = np.zeros((s.size, 6))
+        values = {
+            name: self.functions.get(name, lambda s, side: none)(s, side)
+            for name in ("first", "second", "aims")
+        }
+        return SimpleNamespace(**values)
+
+
+@pytest.mark.parametrize("name", ["first", "second", "aims"])
+@pytest.mark.parametrize("column", [0, 5])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_derivative_jumps_where_its_sides_differ_by_more_than_a_millionth(name, column, sign):
+    """At the second of three breaks, by 2e-6 of the largest one, or by half of that."""
+
+    def stepping(size):
+        def values(s, side):
+            found = np.tile([3.0, 0, 0, 0, 0, -1.0], (s.size, 1))
+            found[:, column] += sign * size * 3.0 * ((s == 2.0) & (side == "right"))
+            return found
+
+        return values
+
+    for size, jumps in ((2e-6, True), (5e-7, False)):
+        found = tracking._jumps(Given(**{name: stepping(size)}), np.array([0.0, 1.0, 2.0, 3.0, 4.0]))
+        assert found.tolist() == [False, False, jumps, False]
+
+
+@pytest.mark.parametrize(("place", "column"), [(0.2, 0), (0.5, 2), (0.8, 4)])
+def test_the_speed_of_an_interval_is_the_largest_that_is_seen_in_it(place, column):
+    """In lengths of the arm where the tool moves, in rad where it turns; one without any is slow, not at rest."""
+
+    def peaked(s, side):
+        found = np.zeros((s.size, 6))
+        found[:, column] = np.where((s > 1) & (np.abs(s - 1 - place) < 0.05), -3.0, 0.0)
+        return found
+
+    found = tracking._speeds(Given(first=peaked), np.array([0.0, 1.0, 2.0, 4.0]))
+    assert found[1] == pytest.approx(3.0 / LENGTH if column < 3 else 3.0)
+    np.testing.assert_allclose(found[[0, 2]] * [1.0, 2.0], 1e-9)
+
+
+def test_short_neighbours_are_taken_together_and_long_ones_are_not():
+    """None that goes beyond 0.02 together; all ends, and the ways of all, are kept."""
+    rng = np.random.default_rng(3)
+    breaks = np.append(0.0, np.cumsum(rng.uniform(1e-3, 1e-2, 60)))
+    speeds = rng.choice([0.1, 1.0, 30.0], 60)
+    kept, merged = tracking._together(breaks, speeds)
+    assert (kept[0], kept[-1]) == (breaks[0], breaks[-1])
+    assert np.isin(kept, breaks).all()
+    ways = np.diff(np.interp(kept, breaks, np.append(0.0, np.cumsum(speeds * np.diff(breaks)))))
+    np.testing.assert_allclose(merged * np.diff(kept), ways, rtol=1e-9)
+    single = np.diff(np.searchsorted(breaks, kept)) == 1
+    assert (ways[~single] <= 0.02 + 1e-12).all()
+    assert (~single).any()
+    assert (ways[:-1] + ways[1:] > 0.02).all()  # no two that would have been near enough
+    few = tracking._together(breaks[:20], speeds[:19])
+    assert few[0].size == 20
+
+
+class Lost(Given):
+    """A follower whose joints are lost in some of the places that are asked for."""
+
+    def __init__(self, lost):
+        super().__init__()
+        self.lost = lost
+
+    def exact(self, s, side, guess):
+        values = np.zeros((3, s.size, 2))
+        values[0] = guess
+        values[2, self.lost, 1] = np.nan
+        return values
+
+
+@pytest.mark.parametrize("lost", [[0], [1], [0, 1]])
+def test_joints_that_are_lost_anywhere_are_lost(lost):
+    """In one of two places, or in both; the guess that is named is that of the first of them."""
+    s, guess = np.array([0.5, 1.0]), np.array([[1.0, 2.0], [3.0, 4.0]])
+    with pytest.raises(LostError) as caught:
+        tracking._exact(Lost(lost), s, "right", guess)
+    assert np.atleast_1d(caught.value.s).tolist() == s[lost].tolist()
+    assert caught.value.joints.tolist() == guess[lost[0]].tolist()
+    tracking._exact(Lost([]), s, "right", guess)
