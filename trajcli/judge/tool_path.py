@@ -23,9 +23,7 @@ from trajcli.limits.tolerances import exceeds
 _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there
 _ROWS = 1024  # at a time
-_INSIDE = (
-    1e-6  # of the distance of samples: how far within a segment a place is still on its side of a corner
-)
+_INSIDE = 1e-6  # of the distance of samples: so far from a corner a place is on its side
 _FURTHER = 2.0  # times the way of the tool from row to row: how far along the path it may get
 
 

@@ -135,7 +135,11 @@ def test_it_is_stuck_where_the_reach_ends():
     edge = np.sqrt((L1 + L2) ** 2 - 0.35**2) - 0.05
     assert edge - 1e-5 < caught.value.s < edge
     assert 0 < caught.value.joints[1] < 0.02
-    assert np.abs(caught.value.rates).max() > 100
+    y, elbow = 0.05 + caught.value.s, caught.value.joints[1]
+    assert elbow == pytest.approx(elbow_of(np.hypot(0.35, y)), rel=1e-9)
+    assert caught.value.rates[1] == pytest.approx(
+        -y / (L1 * L2 * np.sin(elbow)), rel=1e-6
+    )  # of the law of cosines
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-5, 1e-7])
