@@ -260,7 +260,8 @@ class _Follower:
         np.maximum(turns, self._down[row], out=turns)
         np.minimum(turns, self._up[row], out=turns)
         values = joints + FULL * turns
-        branch = int((np.abs(values - last).max(axis=1) + self._refused[row]).argmin())
+        farthest = np.maximum.reduce(np.abs(values - last), axis=1)
+        branch = int((farthest + self._refused[row]).argmin())
         return values[branch : branch + 1], branch
 
     def _continued(self, row: int, last: Array) -> Array | None:

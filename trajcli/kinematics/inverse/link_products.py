@@ -16,7 +16,7 @@ from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import links_of
 
-FEW = 32  # configurations of a redundant arm up to which products of matrices are faster
+FEW = 96  # configurations up to which products of matrices are faster
 
 
 class _Constants(NamedTuple):

@@ -61,8 +61,7 @@ class SearchResult:
 
 def linearised(robot: Robot, target: IkTarget, q: Array) -> tuple[Array, Array]:
     """Return scaled residuals (K, m) and their Jacobian (K, m, n) at joint values (K, n)."""
-    few = len(q) <= FEW and len(robot.joints) > target.coordinates
-    poses, whole = poses_and_jacobians(robot, q) if few else linearisation(robot, q)
+    poses, whole = poses_and_jacobians(robot, q) if len(q) <= FEW else linearisation(robot, q)
     errors, slopes = residuals(target, poses), residual_jacobian(target, poses, whole)
     scale = np.ones(errors.shape[1])
     scale[: sum(target.position)] = 1.0 / characteristic_length(robot)
