@@ -319,15 +319,16 @@ def _may_count(
     Args:
         difference: What is missed, shape (degree + 1, w, n).
         lengths: Shape (w,).
-        interval: To which of the intervals (k,) each belongs, shape (w,).
+        interval: To which of the intervals (k,) each belongs, shape (w,), rising.
         missed: What is missed in these, orders 0 to 2, shape (3, k, n): what is seen is written into it.
     """
     counts = np.zeros(difference.shape[1:], dtype=bool)
+    first = np.flatnonzero(np.diff(interval, prepend=-1))
     for order, own in enumerate(missed):
         derivative = derivative_coefficients(difference, order)
         bound = np.abs(control_points(derivative, lengths[:, None])).max(axis=0)
-        for part in _SEEN:
-            np.maximum.at(own, interval, np.abs(horner(derivative, part * lengths[:, None])))
+        seen = [np.abs(horner(derivative, part * lengths[:, None])) for part in _SEEN]
+        own[interval[first]] = np.maximum.reduceat(np.max(seen, axis=0), first)
         counts |= bound > own.max(axis=0)
         if order == 0:
             counts |= bound > _FEWER * LARGEST_DEVIATION

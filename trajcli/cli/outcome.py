@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterable
 from typing import Any, Literal, TextIO
@@ -58,6 +57,8 @@ def report_error(error: TrajcliError, form: ErrorForm = "text", file: str | None
         file: What it is about, for services, where it has no place in a file.
     """
     if form == "json":
+        import json
+
         print(json.dumps(error_as_json(error), ensure_ascii=False), file=sys.stderr)  # noqa: T201
         return
     if form != "text":
@@ -96,6 +97,8 @@ def report_bug(error: Exception, form: ErrorForm = "text") -> int:
         return of_library.exit_code
     message = f"a bug in trajcli: {error}"
     if form == "json":
+        import json
+
         said = {"error": type(error).__name__, "exit": BUG, "problems": [{"message": message}]}
         print(json.dumps(said), file=sys.stderr)  # noqa: T201
         return BUG
@@ -174,6 +177,8 @@ def print_json(value: Any) -> None:  # noqa: ANN401
 
 
 def _written(value: Any, indent: str) -> Iterable[str]:  # noqa: ANN401
+    import json
+
     deeper = indent + "  "
     if isinstance(value, dict) and value:
         for i, (key, item) in enumerate(value.items()):

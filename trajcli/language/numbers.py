@@ -314,6 +314,13 @@ class FieldType:
         return {**self.json_schema(), "description": self.description}
 
 
+class Instance:
+    """Lets a field hold only instances of its type, which no file writes: pydantic asks for no more."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
+        return core_schema.is_instance_schema(source)
+
+
 @comparable
 class Number(FieldType):
     """A number with its unit, such as a duration.

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import (
     Field,
-    InstanceOf,
     SerializationInfo,
     SerializerFunctionWrapHandler,
     ValidationInfo,
@@ -25,6 +24,7 @@ from trajcli.language.numbers import (
     SI,
     FieldType,
     FlawError,
+    Instance,
     Model,
     Number,
     ReadingContext,
@@ -300,6 +300,10 @@ RELATIVE, NEAR, PINNED = "\0relative", "\0near", "\0pinned"
 """Keys of what a target holds beside what a file gives: none can write them."""
 
 
+_Displacement = Annotated[Relative, Instance()]
+_NamedValues = Annotated[NamedValues, Instance()]
+
+
 class Target(PoseFields, defer_build=False):  # made once, not for each planner that has it
     """The state that a point names, or that a move starts from or ends in: by its joints, or by a pose."""
 
@@ -321,9 +325,9 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
         str | None,
         Field(alias="in", description="The frame in which the pose is given; left out: world."),
     ] = None
-    relative: SkipJsonSchema[InstanceOf[Relative] | None] = Field(None, alias=RELATIVE, exclude=True)
+    relative: SkipJsonSchema[_Displacement | None] = Field(None, alias=RELATIVE, exclude=True)
     near: SkipJsonSchema[tuple[float, ...] | None] = Field(None, alias=NEAR, exclude=True)
-    pinned: SkipJsonSchema[InstanceOf[NamedValues] | None] = Field(None, alias=PINNED, exclude=True)
+    pinned: SkipJsonSchema[_NamedValues | None] = Field(None, alias=PINNED, exclude=True)
 
     @model_validator(mode="after")
     def _joints_are_pinned_or_all(self, info: ValidationInfo) -> Target:
