@@ -14,18 +14,22 @@ acceleration 2 sqrt(w / j), or w / a + a / j.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.extrema import critical_points
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, horner
+from trajcli.curves.operations import cut
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, horner
 from trajcli.frozen import frozen
 
 _NOTHING = 1e-9  # of the range of a joint: turning back by less is rounding
 _UNLIMITED = 1e9  # rad/s or m/s, where no limit is
 _HALVINGS = 64
+_BACK = 1e-6  # of directions of length 1: opposite ones that differ by less go back
+_SIDES: tuple[Side, Side] = ("left", "right")
 _ROUNDING = 1e-12  # relative: taken off, so that a bound stays one
 
 
@@ -111,15 +115,17 @@ def turning_bound(
     path: PiecewisePolynomial,
     bounds: tuple[Array, Array, Array],
     speeds: tuple[float, float],
+    turning: tuple[bool, bool] = (False, False),
 ) -> tuple[float, int]:
     """Return a duration that no motion along a path is shorter than, s, and the joint that needs it.
 
     Args:
         path: q(s) with n joints.
         bounds: Of velocity, acceleration and jerk, each of shape (n, 2).
-        speeds: sd at the start and at the end; zero is rest, without acceleration.
+        speeds: sd at the start and at the end; zero is rest, without acceleration unless it turns back.
+        turning: Whether all joints turn back at the start, and at the end.
     """
-    values, free = _at_breaks_and_turns(path), np.array(speeds) > 0.0
+    values, free = _at_breaks_and_turns(path), (np.array(speeds) > 0.0) | turning
     slopes = np.abs(path.evaluate(np.array([path.start, path.end]), 1)) * np.array(speeds)[:, None]
     times = durations_by_joint(
         [
@@ -130,6 +136,66 @@ def turning_bound(
         ]
     )
     return float(times.max()), int(times.argmax())
+
+
+def bound_between_stops(
+    path: PiecewisePolynomial,
+    bounds: tuple[Array, Array, Array],
+    speeds: tuple[float, float],
+    stops: Array,
+) -> tuple[float, int | None]:
+    """Return what `turning_bound` does of a path with stops: between them the slowest joint counts each time.
+
+    sd is zero at a stop and nowhere below, so that sdd is zero there where it exists. At a corner q' sdd
+    is the same on both sides, which are not parallel: it is zero, too. Only where the path goes back as it
+    came may the acceleration be anything. Straight lines are bounded by the tightest limits of all joints.
+
+    Args:
+        path: Likewise.
+        bounds: Likewise.
+        speeds: Likewise.
+        stops: Values of s between the ends, shape (k,), at which the motion stands.
+
+    Returns:
+        The duration, and the joint that needs it; None where there are stops.
+    """
+    if not stops.size:
+        return turning_bound(path, bounds, speeds)
+    turning = [False, *(_goes_back(path, s) for s in stops.tolist()), False]
+    at_stops, total = [speeds[0], *np.zeros(stops.size), speeds[1]], []
+    for k, s in enumerate([*stops.tolist(), path.end]):
+        part, path = cut(path, s) if s < path.end else (path, path)
+        ends, turns = (at_stops[k], at_stops[k + 1]), (turning[k], turning[k + 1])
+        found = [turning_bound(part, bounds, ends, turns)[0]]
+        if part.pieces == 1 and not part.coefficients[:-2].any():
+            along = _along_line(part.coefficients[-2, 0], bounds)
+            found.append(turning_bound(_length_of(part), along, ends, turns)[0])
+        total.append(max(found))
+    return math.fsum(total), None
+
+
+def _goes_back(path: PiecewisePolynomial, s: float) -> bool:
+    """Return whether a path goes back at s as it came, or has no direction there."""
+    before, behind = (path.evaluate(np.array([s]), 1, side=side)[0] for side in _SIDES)
+    sizes = float(np.linalg.norm(before)), float(np.linalg.norm(behind))
+    if min(sizes) == 0.0:
+        return True
+    return float(np.abs(before / sizes[0] + behind / sizes[1]).max()) < _BACK
+
+
+def _length_of(line: PiecewisePolynomial) -> PiecewisePolynomial:
+    """Return s along a line, as a curve of s."""
+    return PiecewisePolynomial(line.breaks, np.array([[[1.0]], [[line.start]]]))
+
+
+def _along_line(slopes: Array, bounds: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+    """Return the bounds of sd, sdd and sddd, (1, 2) each, along a line with some q' (n,)."""
+    found = []
+    for bound in bounds:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = np.sort(bound / slopes[:, None], axis=1)[slopes != 0.0]
+        found.append(np.array([[ratios[:, 0].max(), ratios[:, 1].min()]]))
+    return found[0], found[1], found[2]
 
 
 def durations_by_joint(joints: Sequence[MonotoneStretches]) -> Array:

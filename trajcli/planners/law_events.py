@@ -37,6 +37,9 @@ def distance_from_bound(motion: TimeOptimalMotion, robot: Robot, stretch: float 
     text = f"at most {math.ceil(above / digit) * digit:.2g} % above the fastest possible along this path: "
     joint = getattr(motion, "bounding_joint", None)
     amounts: Amounts = {"bound": Amount(motion.lower_bound, rounded="down")}
+    if getattr(motion, "bounded_by_stops", False):
+        text += "from stop to stop its slowest joints need {bound} in all"
+        return Event("bound", text, amounts=amounts)
     if joint is None:
         text += "limits of velocity and acceleration alone ask for {bound}"
         return Event("bound", text, amounts=amounts)

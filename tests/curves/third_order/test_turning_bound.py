@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from jerk_paths import PANDA, both, judged, spline
+from jerk_paths import PANDA, both, judged, polyline, spline
 from test_jerk_limited_laws import judged_problem, random_problem, ruckig_duration
 from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.turning_bound import turning_bound
+from trajcli.curves.turning_bound import bound_between_stops, turning_bound
 
 
 def line(distance):
@@ -45,6 +45,32 @@ def test_half_of_a_motion_there_and_back_has_a_free_acceleration(jerk):
     path = PiecewisePolynomial(np.array([0.0, 1.0, 2.0]), np.array([[[0.7], [-0.7]], [[0.0], [0.7]]]))
     duration, _ = turning_bound(path, (both([1.0]), both([4.0]), both([jerk])), (0.0, 0.0))
     assert duration == pytest.approx(2 * least_with_free_start(0.7, 1.0, 4.0, jerk), rel=1e-4)
+
+
+def test_from_stop_to_stop_straight_lines_are_as_fast_as_the_tightest_limits_of_all_joints_allow():
+    points = np.array([[0.0, 0.0], [0.4, 0.1], [0.5, 0.9], [-0.1, 0.6]])
+    limits = np.array([[1.0, 0.6], [4.0, 5.0], [50.0, 30.0]])
+    path = polyline(points)
+    bounds = tuple(both(each) for each in limits)
+    duration, joint = bound_between_stops(path, bounds, (0.0, 0.0), path.breaks[1:-1])
+    expected = [
+        ruckig_duration(1.0, *(limits / np.abs(step)).min(axis=1).tolist())
+        for step in np.diff(points, axis=0)
+    ]
+    assert joint is None
+    assert duration == pytest.approx(sum(expected), rel=1e-9)
+    assert turning_bound(path, bounds, (0.0, 0.0))[0] < 0.9 * duration
+    motion = judged(path, *bounds)
+    assert motion.bounded_by_stops
+    assert duration * (1 - 1e-9) <= motion.law.duration <= duration * 1.002
+
+
+def test_where_a_path_goes_back_as_it_came_its_acceleration_is_free():
+    """Of two joints that both turn back at a stop, which neither stands still at: limits of one bind."""
+    path = polyline(np.array([[0.0, 0.0], [0.7, 0.35], [0.0, 0.0]]))
+    bounds = both([1.0, 9.0]), both([4.0, 9.0]), both([50.0, 99.0])
+    duration, _ = bound_between_stops(path, bounds, (0.0, 0.0), path.breaks[1:-1])
+    assert duration == pytest.approx(2 * least_with_free_start(0.7, 1.0, 4.0, 50.0), rel=1e-4)
 
 
 @pytest.mark.parametrize("seed", few(range(12)))

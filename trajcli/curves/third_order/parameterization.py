@@ -28,7 +28,7 @@ from trajcli.curves.time_optimal.parameterization import (
 )
 from trajcli.curves.time_optimal.refinement import parts_for
 from trajcli.curves.time_optimal.time_law import law_and_trajectory
-from trajcli.curves.turning_bound import turning_bound
+from trajcli.curves.turning_bound import bound_between_stops
 from trajcli.frozen import frozen
 
 _FIRST_GAP = 1e-3  # of the duration: what the first step may miss
@@ -57,11 +57,13 @@ class JerkLimitedMotion(TimeOptimalMotion):
     Attributes:
         steps: Number of convex steps.
         bounding_joint: The joint that alone needs the lower bound between its turning points; None where it
-            is that without limits of jerk.
+            is that without limits of jerk, or where the motion stops.
+        bounded_by_stops: Whether the lower bound is what the slowest joint needs between each two stops.
     """
 
     steps: int
     bounding_joint: int | None
+    bounded_by_stops: bool
 
 
 def jerk_limited_time_optimal(
@@ -125,7 +127,9 @@ def jerk_limited_time_optimal(
         curve, trajectory = scale_time(curve, stretch), scale_time(trajectory, stretch)
     times = curve.breaks[np.searchsorted(law.s, second.stops)]
     lowered = int((search.lowered > 1.0).any(axis=0).sum())
-    alone, joint = turning_bound(path, (bounds[0], bounds[1], bounds[2]), (start[0], end[0]))
+    alone, joint = bound_between_stops(
+        path, (bounds[0], bounds[1], bounds[2]), (start[0], end[0]), second.stops
+    )
     return JerkLimitedMotion(
         trajectory,
         curve,
@@ -139,6 +143,7 @@ def jerk_limited_time_optimal(
         max(second.lower_bound, alone),
         search.steps,
         joint if alone > second.lower_bound else None,
+        joint is None and alone > second.lower_bound,
     )
 
 
