@@ -9,8 +9,10 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from trajcli.errors import InputError
+from trajcli.judge import file as file_module
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
+from trajcli.streams.recorded_motion import MotionFile
 
 TWO_MOVES = """\
 version: 1
@@ -193,3 +195,118 @@ def test_rows_are_joined_as_a_profile_says_unless_somebody_says_otherwise(
         assert judgement.interpolation == joined
         over = [each.value for each in judgement.findings if (each.rule, each.kind) == ("limit", "velocity")]
         assert over == ([pytest.approx(peak)] if 0 < limit < peak else [])
+
+
+def beside_arm(folder: Path, rows: str, joints: str = "joints: 1\n", **asked: str | None) -> Judgement:
+    """Return the judgement of a file by an arm and limits of it, without a job."""
+    (folder / "arm.yaml").write_text(joints)
+    (folder / "rows.csv").write_text(rows)
+    options = CheckOptions(**{"robot": str(folder / "arm.yaml"), **asked})
+    return check_file(str(folder / "rows.csv"), options).judgement
+
+
+@pytest.mark.parametrize("rate", [0.5, 100, 1e9])
+def test_rows_without_times_have_the_rate_that_is_said(rate: float, tmp_path: Path) -> None:
+    found = beside_arm(tmp_path, "q1\n0\n1\n2\n", rate=f"{rate:g}")
+    assert found.period == pytest.approx(1 / rate)
+    for wrong in ("0", "-1", "1.001e9"):
+        with pytest.raises(InputError, match="above 0 and at most 1e"):
+            beside_arm(tmp_path, "q1\n0\n1\n2\n", rate=wrong)
+
+
+def test_options_that_exclude_each_other_or_lack_what_they_are_about_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "limits.yaml").write_text("velocity: 1\n")
+    (tmp_path / "arm.yaml").write_text("joints: 2\n")
+    other = {"limits": str(tmp_path / "limits.yaml"), "robot": str(tmp_path / "arm.yaml")}
+    for name, path in other.items():
+        with pytest.raises(InputError, match=f"--{name} is given"):
+            judged(tmp_path, TWO_MOVES, two_moves(1, 1), NAMES, **{name: path})
+    with pytest.raises(InputError, match="--payload exclude"):
+        judged(tmp_path, TWO_MOVES, two_moves(1, 1), NAMES, payload="1 kg")
+    with pytest.raises(InputError, match="--start-tolerance is about the start"):
+        beside_arm(tmp_path, "t,q1\n0,0\n1,1\n", start_tolerance="0.1")
+    with pytest.raises(InputError, match="judged by"):
+        beside_arm(tmp_path, "t,q1\n0,0\n1,1\n", robot=None)
+
+
+SHORT = "{planner: trapezoid, to: {joints: [0.4, 0]}, duration: 0.01}"
+
+
+def test_a_job_without_a_plan_still_says_limits(tmp_path: Path) -> None:
+    """No trapezoid lasts so short a time: so nothing is said of start and end, which these rows miss."""
+    job = TWO_MOVES.replace("{velocity: 9,", "{position: [[-0.5, 0.5], [-0.5, 0.5]], velocity: 2,")
+    job = job.replace("{planner: quintic, to: {joints: [1, 0]}, duration: 1}", SHORT)
+    rows = two_moves(0.45, 0.2)
+    rows[:, 2] += 0.2
+    found = judged(tmp_path, job, rows, NAMES)
+    assert any("the job has no plan" in note for note in found.notes)
+    assert {each.kind for each in found.findings} == set()
+    fast = judged(tmp_path, job, two_moves(1.2, 0.2), NAMES)  # beyond 0.5 rad, and at 2.25 rad/s
+    assert {each.kind for each in fast.findings if each.certainty == "exceeded"} == {"position", "velocity"}
+
+
+@pytest.mark.parametrize("end", ["[0.1, 0, 0, 0, 0, 0]", "[99, 0, 0, 0, 0, 0]"])
+def test_what_a_job_takes_for_granted_is_said_with_and_without_a_plan(end: str, tmp_path: Path) -> None:
+    job = "version: 1\nrobot: ur5e\nlimits: {velocity: 20}\nstart: {joints: [0, 0, 0, 0, 0, 0]}\n"
+    job += f"moves: [{{planner: quintic, to: {{joints: {end}}}, duration: 1}}]\n"
+    rows = np.hstack([0.01 * np.arange(3)[:, None], np.zeros((3, 6))])
+    found = judged(tmp_path, job, rows, "t,q1,q2,q3,q4,q5,q6")
+    assert any("20 rad/s" in event for event in found.events)
+    stricter = judged(tmp_path, job.replace("velocity: 20", "velocity: 1"), rows, "t,q1,q2,q3,q4,q5,q6")
+    assert stricter.events == ()
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_start_tolerance_is_an_angle_or_a_length_by_joint(joint: int, tmp_path: Path) -> None:
+    """5 is 5 deg where the joint turns, and 5 mm where it slides."""
+    job = "version: 1\nunits: {angle: deg, length: mm}\nrobot: {joints: [{type: revolute}, {type: prismatic}]}\n"
+    job += (
+        "limits: {velocity: [900, 9000], acceleration: [9000, 90000], jerk: null}\nstart: {joints: [0, 0]}\n"
+    )
+    job += "moves: [{planner: quintic, to: {joints: [30, 100]}, duration: 1}]\noutput: {rate: 100}\n"
+    allowed = (5.0, 5.0)
+    for by in (0.99, 1.01, -1.01):
+        start, t = np.zeros(2), 0.01 * np.arange(101)
+        start[joint] = by * allowed[joint]
+        states = start + quintic(t)[0][:, None] * (np.array([30.0, 100.0]) - start)
+        rows = np.hstack([t[:, None], states])
+        found = judged(tmp_path, job, rows, "t,q1,q2", start_tolerance="5", units="deg,mm").findings
+        off = [each.joint for each in found if (each.rule, each.kind) == ("state", "start")]
+        assert off == ([f"j{joint + 1}"] if abs(by) > 1 else [])
+
+
+@pytest.mark.parametrize("by", [0.0, 2e-3])
+def test_a_consumer_is_told_where_the_job_starts(by: float, tmp_path: Path) -> None:
+    rows = two_moves(1.0, 1.0)
+    rows[:, 2] += by
+    found = judged(tmp_path, TWO_MOVES, rows, NAMES, profile="ros-jtc")
+    assert [each.joint for each in found.findings if each.rule == "jtc-first-point"] == (["j2"] if by else [])
+    assert not any("where the arm stands" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("interpolate", ["linear", "cubic", "quintic", "jtc-upsampling"])
+def test_blocks_of_rows_are_judged_as_all_rows_at_once(
+    interpolate: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where moves are told by the times of the first row and of the last one."""
+    rows = two_moves(1.2, -1.08)
+    rows[70, 3] += 0.3
+
+    def said() -> list[tuple[object, ...]]:
+        found = judged(tmp_path, TWO_MOVES, rows, NAMES, interpolate=interpolate).findings
+        return sorted((each.kind, each.joint, each.move, each.row, each.value) for each in found)
+
+    whole = said()
+    assert ("j2", 1) in [each[1:3] for each in whole]
+    monkeypatch.setattr(file_module, "JUDGED_ROWS", 7)
+    plain = MotionFile.blocks
+    monkeypatch.setattr(MotionFile, "blocks", lambda self, count=7: plain(self, count))
+    assert said() == whole
+
+
+def test_a_job_in_the_place_of_rows_is_named_before_anything_is_missed(tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text(TWO_MOVES)
+    with pytest.raises(InputError) as caught:
+        check_file(str(tmp_path / "job.yaml"), CheckOptions())
+    assert "judged by" not in str(caught.value)
+    assert "job" in caught.value.problems[0].text()

@@ -135,6 +135,8 @@ def test_it_is_stuck_where_the_reach_ends():
     edge = np.sqrt((L1 + L2) ** 2 - 0.35**2) - 0.05
     assert edge - 1e-5 < caught.value.s < edge
     assert 0 < caught.value.joints[1] < 0.02
+    assert caught.value.lost is not None
+    assert edge < caught.value.lost.s[0] < edge + 1e-4
     y, elbow = 0.05 + caught.value.s, caught.value.joints[1]
     assert elbow == pytest.approx(elbow_of(np.hypot(0.35, y)), rel=1e-9)
     assert caught.value.rates[1] == pytest.approx(
@@ -263,3 +265,46 @@ def test_joints_that_are_lost_anywhere_are_lost(lost):
     assert np.atleast_1d(caught.value.s).tolist() == s[lost].tolist()
     assert caught.value.joints.tolist() == guess[lost[0]].tolist()
     tracking._exact(Lost([]), s, "right", guess)
+
+
+class Polynomial(Given):
+    """A follower whose joints are polynomials of s, wherever they are looked for."""
+
+    def __init__(self, joints):
+        super().__init__()
+        self.joints = joints
+
+    def exact(self, s, side, guess):
+        return np.array([[joint.deriv(order)(s) for joint in self.joints] for order in range(3)]).swapaxes(
+            1, 2
+        )
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("size", [2.0, -2.0])
+def test_a_prediction_is_off_by_what_it_leaves_out(joint, size):
+    """Of size s^3, from s = 0 on with two derivatives: by all of it, in either direction; a parabola is exact."""
+    step = 0.4
+    for power, off in ((3, abs(size) * step**3), (2, 0.0)):
+        joints = [np.poly1d([0.3, -0.2]), np.poly1d([-0.1, 0.7])]
+        joints[joint] = np.poly1d([size, *[0.0] * power])
+        follower_of = Polynomial(joints)
+        state = follower_of.exact(np.zeros(1), "right", None)[:, 0]
+        exact, deviation = tracking._attempt(follower_of, 0.0, step, state)
+        assert deviation == pytest.approx(off, abs=1e-15)
+        np.testing.assert_allclose(exact, follower_of.exact(np.array([0.2, 0.4]), "left", None))
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize("size", [5.0, -5.0])
+def test_a_bulge_between_both_ends_counts_ten_times(joint, size):
+    """Of size s^3 (s - h)^3 no derivative that is known differs from none; in the middle it is h^6 / 64."""
+    step = 0.8
+    bulge = size * np.poly1d([1.0, 0.0, 0.0, 0.0]) * np.poly1d([1.0, -step]) ** 3
+    joints = [np.poly1d([0.3]), np.poly1d([-0.1])]
+    joints[joint] = bulge
+    follower_of = Polynomial(joints)
+    _, deviation = tracking._attempt(
+        follower_of, 0.0, step, follower_of.exact(np.zeros(1), "right", None)[:, 0]
+    )
+    assert deviation == pytest.approx(10.0 * abs(size) * step**6 / 64)

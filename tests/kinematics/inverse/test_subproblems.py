@@ -7,9 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from trajcli.kinematics.inverse.families.screw_axes import (
+    Displacement,
+    InverseDisplacement,
     ScrewAxis,
     across_floats,
     aside,
+    axis_geometry,
     common_point,
     contains,
     meeting_point,
@@ -30,6 +33,7 @@ from trajcli.kinematics.inverse.families.subproblems import (
     two_turns,
     unit,
 )
+from trajcli.kinematics.robot import Joint, Robot, unlimited
 
 AXES = [
     (1.0, 0.0, 0.0),
@@ -135,6 +139,15 @@ def test_both_turns_to_a_level_reach_it(axis, sign: float) -> None:
     np.testing.assert_allclose(x, level - of_vector * of_normal, atol=1e-12)
 
 
+def test_the_side_of_the_first_turn_may_be_another_one_for_each_pose() -> None:
+    sign = np.where(np.arange(COUNT) % 3 == 0, -1.0, 1.0)
+    level = np.random.default_rng(4).uniform(-0.5, 0.5, COUNT)
+    turn, (_, y) = levels((0.0, 0.0, 1.0), (1.0, 0.0, 0.2), (1.0, 0.0, 0.0), level, flags(), sign=sign)
+    np.testing.assert_allclose(y, sign * np.sqrt(1 - level**2))
+    np.testing.assert_allclose(turn[0], [level, level], atol=1e-14)
+    np.testing.assert_allclose(turn[1][0], y)
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_level_out_of_reach_is_approached(side: float) -> None:
     """About z (1, 0, .) reaches from -1 to 1 along x; one at the end of that is a double solution, and noted."""
@@ -169,6 +182,11 @@ def whole(value) -> tuple[np.ndarray, np.ndarray]:
         ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0)),
         ((0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 0.6, 0.8)),
         ((0.48, -0.6, 0.64), (0.0, 1.0, 0.0), (0.8, 0.6, 0.0)),
+        ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)),
+        ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, 0.6, 0.8)),
+        ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, -0.6, 0.8)),
+        ((0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 1.0, 0.0)),
+        ((0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (0.0, 1.0, 0.0)),
     ],
 )
 def test_both_pairs_of_turns_reach_the_aim(first, second, vector, sign: float) -> None:
@@ -204,6 +222,23 @@ def test_angles_that_are_written_are_those_of_both_turns(kind) -> None:
     assert out[0, 5:].tolist() == [0.0, np.pi]
 
 
+@pytest.mark.parametrize("near", [1e-3, 1e-5])
+def test_an_aim_almost_on_the_first_axis_still_says_how_to_turn(near: float) -> None:
+    """Its distance of some ten millionths is none that leaves the turn about that axis open."""
+    first, second, vector = (0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 0.0, 1.0)
+    angles = np.linspace(-3.0, 3.0, COUNT)
+    aims = rotated(first, angles, rotated(second, np.full(COUNT, near), np.array(vector)))
+    noted = flags()
+    around, bend = (
+        np.broadcast_to(angles_of(whole(each)), (2, COUNT))
+        for each in two_turns(first, second, vector, columns(aims), noted)
+    )
+    for k in range(2):
+        reached = rotated(first, around[k], rotated(second, bend[k], np.array(vector)))
+        np.testing.assert_allclose(reached, aims, atol=1e-9)
+    assert not noted.rows.any()
+
+
 def axis(direction, point=(0.0, 0.0, 0.0)) -> ScrewAxis:
     size = float(np.linalg.norm(direction))
     return ScrewAxis(False, tuple(float(each) / size for each in direction), point)
@@ -222,18 +257,21 @@ def test_axes_are_parallel_or_at_right_angles_within_a_billionth(tilt: float) ->
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("length", [1.0, 20.0])
-def test_axes_meet_where_they_are_a_billionth_of_the_arm_apart(length: float, side: float) -> None:
-    """One along x through (1, 2, 3), and one along (0, 1, 1) that passes it at a distance along (0, 1, -1)."""
+@pytest.mark.parametrize("aslant", [0.0, 9.0])
+def test_axes_meet_where_they_are_a_billionth_of_the_arm_apart(
+    length: float, side: float, aslant: float
+) -> None:
+    """One along x through (1, 2, 3), and one that passes it at a distance along (0, 1, -1), at any angle."""
     place, across_both = np.array([1.0, 2.0, 3.0]), np.array([0.0, 1.0, -1.0]) / np.sqrt(2)
     one = axis((1, 0, 0), tuple(place - [5.0, 0, 0]))
     for apart, meets in ((0.0, True), (0.9e-9, True), (1.1e-9, False), (1e-3, False)):
-        point = place + side * apart * length * across_both + np.array([0.0, 4.0, 4.0])
-        other = axis((0, 1, 1), tuple(point.tolist()))
+        point = place + side * apart * length * across_both + np.array([2.0 * aslant, 2.0, 2.0])
+        other = axis((aslant, 1, 1), tuple(point.tolist()))
         for pair in ((one, other), (other, one)):
             found = meeting_point(*pair, length)
             assert (found is not None) is meets
             if found is not None:
-                np.testing.assert_allclose(found, place, atol=2e-9 * length)
+                np.testing.assert_allclose(found, place, atol=2e-8 * length)
         third = axis((0, 0, 1), (1.0, 2.0 + side * apart * length, -4.0))
         crossing = axis((0, 1, 1), (1.0, 6.0, 7.0))
         assert (common_point((one, crossing, third), length) is not None) is meets
@@ -252,3 +290,61 @@ def test_a_vector_beside_a_direction_is_at_right_angles_to_it() -> None:
     assert turned_over.direction == (-0.6, 0.0, -0.8)
     assert axis((0, 0, 1)).drawn == (0.0, 0.0, 1.0)
     assert ScrewAxis(False, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), -1.0).drawn == (0.0, 0.0, -1.0)
+
+
+def arm_of(*rows: tuple[float, float, float, float], base: np.ndarray | None = None) -> Robot:
+    """Return revolute joints by theta, d, a and alpha."""
+    joints = tuple(Joint(f"j{k}", "revolute", *row) for k, row in enumerate(rows))
+    frame = np.eye(4) if base is None else base
+    return Robot("arm", joints, unlimited(len(joints)), "standard", frame, np.eye(4))
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7, -2.5])
+@pytest.mark.parametrize("alpha", [np.pi / 2, -np.pi / 2, 1.0])
+@pytest.mark.parametrize("a", [0.3, -0.3, 0.0])
+def test_forward_is_from_the_first_axis_to_the_second(theta: float, alpha: float, a: float) -> None:
+    """Along x of the first link, turned over where that is drawn backwards."""
+    found = axis_geometry(arm_of((theta, 0.4, a, alpha), (0.2, 0.1, 0.5, 0.0)))
+    x = np.array([np.cos(theta), np.sin(theta), 0.0])
+    np.testing.assert_allclose(found.forward, -x if a < 0 else x, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("turn", "upward"),
+    [
+        ([0.0, 0.0, 0.0], [0, 0, 1]),
+        ([np.pi, 0.0, 0.0], [0, 0, -1]),  # hung from a ceiling
+        ([2.0, 0.0, 0.0], [0, 0, -1]),
+        ([np.pi / 2, 0.0, 0.0], [0, 0, 1]),  # on a wall: as in the base
+        ([0.0, -1.0, 0.0], [0, 0, 1]),
+    ],
+)
+def test_upward_is_along_the_first_axis_as_it_rises_in_the_world(turn, upward) -> None:
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    assert axis_geometry(arm_of((0, 0.4, 0.3, 1.5), (0, 0, 0.5, 0), base=base)).upward == tuple(upward)
+
+
+def test_displacements_take_points_and_directions_from_zero_to_a_pose_and_back() -> None:
+    """G with G H = B^-1 T, of a base and a tool anywhere."""
+    rng = np.random.default_rng(12)
+    frames = np.tile(np.eye(4), (8, 1, 1))
+    frames[:, :3, :3] = Rotation.random(8, random_state=3).as_matrix()
+    frames[:, :3, 3] = rng.normal(size=(8, 3))
+    base, poses = frames[0], frames[1:]
+    arm = axis_geometry(arm_of((0.3, 0.4, 0.3, 1.5), (0.1, 0, 0.5, 0.2), base=base))
+    goal = Displacement(arm, poses[:, :3].reshape(7, 12).T)
+    back = InverseDisplacement(goal)
+    G = np.linalg.inv(base) @ poses @ np.linalg.inv(arm.home)
+    place = rng.normal(size=3)
+    turned_to, taken = G[:, :3, :3] @ place, G[:, :3, :3] @ place + G[:, :3, 3]
+    np.testing.assert_allclose(np.stack(goal.direction(tuple(place)), axis=1), turned_to, atol=1e-12)
+    np.testing.assert_allclose(np.stack(goal.point(tuple(place)), axis=1), taken, atol=1e-12)
+    inverse = np.linalg.inv(G)
+    expected = np.einsum("nij,j->ni", inverse[:, :3, :3], place)
+    np.testing.assert_allclose(np.stack(goal.view(tuple(place)), axis=1), expected, atol=1e-12)
+    np.testing.assert_allclose(np.stack(back.direction(tuple(place)), axis=1), expected, atol=1e-12)
+    returned = expected + inverse[:, :3, 3]
+    np.testing.assert_allclose(np.stack(back.point(tuple(place)), axis=1), returned, atol=1e-12)
+    again = back.point(tuple(taken.T))
+    np.testing.assert_allclose(np.stack(again, axis=1), np.tile(place, (7, 1)), atol=1e-12)
