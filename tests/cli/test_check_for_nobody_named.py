@@ -7,8 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from planned_examples import planned_example
 from running import call
 from tiers import few
+
+from trajcli.judge.rows.rows_for_consumers import consumers_of
+from trajcli.streams.byte_source import ByteSource
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SLOW = ("--set", "when_over_limit=slow")
@@ -54,6 +58,16 @@ def test_the_table_says_it_in_its_first_line(tmp_path: Path, capfd: pytest.Captu
     outcome = call(capfd, "check", str(file), "--job", str(EXAMPLES / "sync.yaml"))
     first = outcome.out.splitlines()[0]
     assert "rows of the motion that the job plans with `--for ros-jtc --set when_over_limit=slow`)" in first
+
+
+def test_a_consumer_that_has_the_rate_of_the_rows_is_tried_first(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file, example = tmp_path / "rows.csv", planned_example("moveit_limits")
+    planned(capfd, "moveit_limits.yaml", file, "--for", "ur-servoj")
+    tried = [made.profile for made in consumers_of(ByteSource(str(file)), example)]
+    assert tried[0] == "ur-servoj"
+    assert "ros-jtc" in tried
 
 
 def _off(lines: list[str], row: int, column: int, by: float) -> list[str]:
