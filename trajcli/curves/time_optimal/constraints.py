@@ -131,13 +131,13 @@ class JointConstraint:
         """Return the rows at points (p,), one for each finite bound of acceleration."""
         upper, lower = np.isfinite(self.acceleration[:, 1]), np.isfinite(self.acceleration[:, 0])
         limits = np.concatenate([self.acceleration[upper, 1], -self.acceleration[lower, 0]])
-        q, first, second = self.path.evaluate_orders(s, (0, 1, 2), side=side).transpose(1, 0, 2)
-        sizes = np.abs(first).max(axis=0)
+        values = self.path.evaluate_orders(s, (0, 1, 2), side=side)
+        q, first, second = np.ascontiguousarray(values.transpose(1, 2, 0))  # (n, p): over p it goes fast
+        sizes = np.abs(first).max(axis=1, keepdims=True)
         first = np.where(sizes > _ROUNDING * sizes.max(), first, 0.0)  # rounding moves no joint that rests
-        work, a, b = (
-            np.concatenate([each[:, upper], -each[:, lower]], axis=1) for each in (q, first, second)
-        )
-        rate = np.maximum(first / self.velocity[:, 1], first / self.velocity[:, 0]).max(axis=1)
+        work, a, b = (np.concatenate([each[upper], -each[lower]]).T for each in (q, first, second))
+        low, high = self.velocity.T[..., None]
+        rate = np.maximum(first / high, first / low).max(axis=0)
         with np.errstate(divide="ignore", over="ignore"):
             return ConstraintRows(a, b, np.broadcast_to(limits, a.shape), rate**-2.0, work * limits)
 

@@ -59,10 +59,11 @@ def _one_by_one(slopes: Array, offsets: Array, limits: Array, z: float) -> list[
         lowest = offset - slope * z
         if not lowest < limit:
             lowest = limit
-        for more_slope, more_offset in islice(lines, count) if count else ():
-            value = more_offset - more_slope * z
-            if value < lowest:
-                lowest = value
+        if count:
+            for more_slope, more_offset in islice(lines, count):
+                value = more_offset - more_slope * z
+                if value < lowest:
+                    lowest = value
         z = lowest if lowest > 0.0 else 0.0  # zero is always allowed: what is below is rounding
         values.append(z)
     return values
