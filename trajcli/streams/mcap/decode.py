@@ -17,6 +17,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.streams.mcap.cdr import Bytes
 
 _STATES = ("position", "velocity", "acceleration", "effort")
+_STAMP = (4, 8)  # where the stamp of a message stands, and its length
 
 
 class DamagedMessageError(ValueError):
@@ -205,21 +206,24 @@ def joint_states(
         alike = left[lengths[left] == length]
         raw = np.lib.stride_tricks.sliding_window_view(data, length)[starts[alike]]
         fits = _fits(raw, layout)
-        alike, raw = alike[fits], raw[fits]
+        if not fits.all():
+            alike, raw = alike[fits], raw[fits]
         stamps[alike] = _stamps(raw, layout.order)
         for out, (at, number) in zip(values, layout.sequences, strict=True):
             part = np.ascontiguousarray(raw[:, at : at + 8 * number])
             out[alike] = part.view(layout.order + "f8") if number else part.astype(np.float64)
-        left = np.setdiff1d(left, alike, assume_unique=True)
+        left = left[:0] if alike.size == left.size else np.setdiff1d(left, alike, assume_unique=True)
     return JointSeries(first.names, stamps, *(values[0], values[1], values[2], values[3]))
 
 
 def _fits(raw: Bytes, layout: StateLayout) -> NDArray[np.bool_]:
     """Return which messages (N, length) have the bytes of the first but for stamp and numbers."""
-    fits: NDArray[np.bool_] = (raw[:, :4] == raw[0, :4]).all(axis=1)
-    low = 12
-    for at, length in (*layout.free, (layout.length, 0)):
-        fits = fits & (raw[:, low:at] == raw[0, low:at]).all(axis=1)
+    fits = np.ones(len(raw), dtype=bool)
+    low = 0
+    for at, length in (_STAMP, *layout.free, (layout.length, 0)):
+        same = raw[:, low:at] == raw[0, low:at]
+        if not same.all():  # of all bytes at once that is seen soonest
+            fits &= same.all(axis=1)
         low = at + length
     return fits
 
