@@ -245,13 +245,15 @@ def test_a_job_without_a_plan_still_says_limits(tmp_path: Path) -> None:
     assert {each.kind for each in fast.findings if each.certainty == "exceeded"} == {"position", "velocity"}
 
 
-@pytest.mark.parametrize("end", ["[0.1, 0, 0, 0, 0, 0]", "[99, 0, 0, 0, 0, 0]"])
-def test_what_a_job_takes_for_granted_is_said_with_and_without_a_plan(end: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("law", ["planner: quintic, duration: 1", "planner: trapezoid, duration: 0.001"])
+def test_what_a_job_takes_for_granted_is_said_with_and_without_a_plan(law: str, tmp_path: Path) -> None:
+    """No trapezoid lasts so short a time."""
     job = "version: 1\nrobot: ur5e\nlimits: {velocity: 20}\nstart: {joints: [0, 0, 0, 0, 0, 0]}\n"
-    job += f"moves: [{{planner: quintic, to: {{joints: {end}}}, duration: 1}}]\n"
+    job += f"moves: [{{{law}, to: {{joints: [0.5, 0, 0, 0, 0, 0]}}}}]\n"
     rows = np.hstack([0.01 * np.arange(3)[:, None], np.zeros((3, 6))])
     found = judged(tmp_path, job, rows, "t,q1,q2,q3,q4,q5,q6")
     assert any("20 rad/s" in event for event in found.events)
+    assert any("has no plan" in note for note in found.notes) is ("trapezoid" in law)
     stricter = judged(tmp_path, job.replace("velocity: 20", "velocity: 1"), rows, "t,q1,q2,q3,q4,q5,q6")
     assert stricter.events == ()
 
@@ -289,11 +291,15 @@ def test_blocks_of_rows_are_judged_as_all_rows_at_once(
     interpolate: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where moves are told by the times of the first row and of the last one."""
-    rows = two_moves(1.2, -1.08)
+    rows, names = two_moves(1.2, -1.08), NAMES
     rows[70, 3] += 0.3
+    if (
+        interpolate == "jtc-upsampling"
+    ):  # a spline through positions, each piece of which depends on all of them
+        rows, names = rows[:, :3], "t,q1,q2"
 
     def said() -> list[tuple[object, ...]]:
-        found = judged(tmp_path, TWO_MOVES, rows, NAMES, interpolate=interpolate).findings
+        found = judged(tmp_path, TWO_MOVES, rows, names, interpolate=interpolate).findings
         return sorted((each.kind, each.joint, each.move, each.row, each.value) for each in found)
 
     whole = said()
@@ -310,3 +316,18 @@ def test_a_job_in_the_place_of_rows_is_named_before_anything_is_missed(tmp_path:
         check_file(str(tmp_path / "job.yaml"), CheckOptions())
     assert "judged by" not in str(caught.value)
     assert "job" in caught.value.problems[0].text()
+
+
+def test_a_column_of_moves_counts_and_not_their_times(tmp_path: Path) -> None:
+    """Rows of the first second are said to be of the second move, which has 2 rad/s."""
+    rows, names = two_moves(1.2, 1.0), f"{NAMES},move"
+    assert not [each for each in judged(tmp_path, TWO_MOVES, rows, NAMES).findings if each.kind == "velocity"]
+    rows = np.hstack([rows, np.ones((201, 1))])
+    found = [each for each in judged(tmp_path, TWO_MOVES, rows, names).findings if each.kind == "velocity"]
+    assert [(each.joint, each.limit) for each in found] == [("j1", 2.0)]
+
+
+def test_what_a_profile_cannot_judge_is_said(tmp_path: Path) -> None:
+    found = beside_arm(tmp_path, "t,q1,qd1\n0,0,0\n1,0,0\n", profile="ros-jtc")
+    assert any("jtc-first-point is not judged" in note for note in found.notes)
+    assert not beside_arm(tmp_path, "t,q1,qd1\n0,0,0\n1,0,0\n").notes

@@ -325,6 +325,17 @@ def test_upward_is_along_the_first_axis_as_it_rises_in_the_world(turn, upward) -
     assert axis_geometry(arm_of((0, 0.4, 0.3, 1.5), (0, 0, 0.5, 0), base=base)).upward == tuple(upward)
 
 
+def test_on_a_wall_upward_is_as_in_the_base_however_the_axis_is_drawn() -> None:
+    """In modified tables the first axis may point down."""
+    wall = np.eye(4)
+    wall[:3, :3] = Rotation.from_rotvec([np.pi / 2, 0.0, 0.0]).as_matrix()
+    joints = Joint("j0", "revolute", 0.0, 0.4, 0.0, np.pi), Joint("j1", "revolute", 0.0, 0.0, 0.3, 1.5)
+    robot = Robot("arm", joints, unlimited(2), "modified", wall, np.eye(4))
+    found = axis_geometry(robot)
+    assert found.axes[0].direction == pytest.approx((0.0, 0.0, -1.0))
+    assert found.upward == pytest.approx((0.0, 0.0, 1.0))
+
+
 def test_displacements_take_points_and_directions_from_zero_to_a_pose_and_back() -> None:
     """G with G H = B^-1 T, of a base and a tool anywhere."""
     rng = np.random.default_rng(12)
