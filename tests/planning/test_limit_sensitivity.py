@@ -12,7 +12,8 @@ import pytest
 import trajcli
 from trajcli.curves.approach import ApproachLimits, durations_at_limit
 from trajcli.curves.extrema import durations_above
-from trajcli.planning.plan import Plan
+from trajcli.job.read import job_from_text
+from trajcli.planning.plan import Plan, plan_job
 from trajcli.planning.sensitivity import NEAR, RAISED, raised, savings_of, times_at_limits
 
 
@@ -145,6 +146,23 @@ def test_the_job_with_the_raised_limit_is_faster_by_that(kind: str) -> None:
         assert saving == pytest.approx(
             plan.trajectory.duration - faster.trajectory.duration, rel=1e-9, abs=1e-12
         )
+
+
+@pytest.mark.full
+def test_a_limit_of_a_move_that_is_flown_by_saves_what_the_whole_chain_gains() -> None:
+    """An oracle beside: the same job, the limit written into its file, and taken back for the other move."""
+    limits = {"velocity": [3.0, 3.0], "acceleration": [8.0, 8.0], "jerk": [60.0, 60.0]}
+    higher = {**limits, "jerk": [60.0, 60.0 * RAISED]}
+    moves = [{"planner": "jerk_limited", "to": {"joints": each}} for each in ([0.9, 1.25], [1.0, 2.0])]
+    job = {"version": 1, "robot": "planar2r", "start": {"joints": [0.3, 1.2]}, "zone": 0.02}
+    plan = plan_job(job_from_text(json.dumps({**job, "limits": limits, "moves": moves})))
+    savings = {(one.joint, one.order): one.saved for one in savings_of(plan, [1])}
+    assert min(savings.values()) >= 0
+    moves[0] = {**moves[0], "limits": {"jerk": limits["jerk"]}}
+    faster = plan_job(job_from_text(json.dumps({**job, "limits": higher, "moves": moves})))
+    gained = plan.trajectory.duration - faster.trajectory.duration
+    assert savings[1, 3] == pytest.approx(gained, rel=1e-3)
+    assert gained > 0.005
 
 
 def test_a_path_binds_all_the_time() -> None:

@@ -190,12 +190,35 @@ def _given(plan: Plan, move: PlannedMove) -> Planner:
 
 def _saving(plan: Plan, move: PlannedMove, joint: int, order: int) -> Saving:
     robot = replace(move.robot, limits=raised(move.robot.limits, joint, order))
+    if move.planned.parts:
+        return _saving_of_chain(plan, move, joint, order)
     try:
         planner = _given(plan, move).searched_from(move.planned)
         faster = plan_move_within(plan.loaded, move.index, planner, move.start, robot)
     except TrajcliError as error:
         return Saving(move.index, joint, order, None, error.problems[0].text(plan.loaded.say))
     return Saving(move.index, joint, order, move.duration - faster.duration)
+
+
+def _saving_of_chain(plan: Plan, move: PlannedMove, joint: int, order: int) -> Saving:
+    """Return what another limit of a move saves where the motion flies by its corners: of the whole chain.
+
+    What is within the lower limit is within the higher one, too: a slower motion saves nothing.
+    """
+    from trajcli.planners.flying_by import duration_within
+
+    chains = () if plan.flyby is None or plan.flyby.chains is None else plan.flyby.chains
+    chain = next((each for each in chains if move.index in each.moves), None)
+    if chain is None:
+        reason = "not planned: it flies by corners, and others are stopped at although zones are named"
+        return Saving(move.index, joint, order, None, reason)
+    own = chain.robots[chain.moves.index(move.index)]
+    higher = replace(own, limits=raised(own.limits, joint, order))
+    try:
+        duration = duration_within(chain, move.index, higher)
+    except TrajcliError as error:
+        return Saving(move.index, joint, order, None, error.problems[0].text(plan.loaded.say))
+    return Saving(move.index, joint, order, max(chain.duration - duration, 0.0))
 
 
 def raised(limits: Limits, joint: int, order: int) -> Limits:

@@ -7,12 +7,19 @@ from trajcli.planners.flying_by.flown_moves import (
     stretched_chain,
     zone_events,
 )
-from trajcli.planners.flying_by.within_limits import FlownChain, close_bound, flown, second_order_bound
+from trajcli.planners.flying_by.within_limits import (
+    FlownChain,
+    close_bound,
+    duration_within,
+    flown,
+    second_order_bound,
+)
 
 __all__ = [
     "FlownChain",
     "FlownZone",
     "close_bound",
+    "duration_within",
     "flown",
     "flown_zones",
     "moves_as_flown",

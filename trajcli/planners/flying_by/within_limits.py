@@ -72,6 +72,25 @@ class FlownChain:
         return chain_of(courses, zones, self.chain.ends, [1.0] * len(zones))
 
 
+def duration_within(chain: FlownChain, move: int, robot: Robot) -> float:
+    """Return how long a chain lasts with other limits of one of its moves, s, found as the chain was.
+
+    Args:
+        chain: As it is flown.
+        move: Index of the move among those planned.
+        robot: With its limits.
+
+    Raises:
+        PlanningError: When no motion through the zones keeps all limits.
+    """
+    number = chain.moves.index(move)
+    courses = list(chain.chain.courses)
+    courses[number] = replace(courses[number], robot=robot)  # type: ignore[type-var]
+    zones = [corner.around for corner in chain.chain.corners]
+    _, parts, _ = _within_limits(courses, zones, chain.chain.ends)
+    return math.fsum(part.curve.duration for part in parts)
+
+
 def second_order_bound(chain: FlownChain) -> float:
     """Return a duration, s, that no motion of a chain falls below, found without most limits of jerk."""
     from trajcli.planners.flying_by.second_order import second_order_duration
