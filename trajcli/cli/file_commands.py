@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command
-from trajcli.cli.options import Json, Overrides, joint_names, profile_words, quantity_names
+from trajcli.cli.options import Json, Overrides, TopicName, joint_names, profile_words, quantity_names
 
 
 class DiffCommand(Command):
@@ -37,15 +37,7 @@ class DiffCommand(Command):
     resample: Annotated[
         bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
     ] = False
-    topic: Annotated[
-        str | None,
-        typer.Option(
-            "--topic",
-            metavar="T",
-            help="MCAP: the topic, of JointState or JointTrajectory.",
-            show_default="/joint_states",
-        ),
-    ] = None
+    topic: TopicName = None
     view: Annotated[
         str | None,
         typer.Option("--view", metavar="FILE", help="Also write a page that plays both of two files."),

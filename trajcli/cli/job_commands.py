@@ -11,12 +11,17 @@ import typer
 
 from trajcli.cli.command import Command, CommandLine
 from trajcli.cli.options import (
+    ColumnMap,
     Consumer,
+    FieldName,
+    FileUnits,
     JobErrors,
     JobFile,
     Json,
+    MotionForm,
     Overrides,
     RowTimes,
+    TopicName,
     profile_words,
     robot_names,
 )
@@ -41,10 +46,7 @@ class PlanCommand(CommandLine):
             help="FILE.csv, .mcap, .jsonl, .npy, .npz or .yaml (a ROS message).",
         ),
     ] = None
-    form: Annotated[
-        Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"] | None,
-        typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
-    ] = None
+    form: MotionForm = None
     report: Annotated[
         str | None, typer.Option("--report", metavar="FILE", help="Write the verification report as JSON.")
     ] = None
@@ -189,28 +191,13 @@ class CheckCommand(Command):
             help="Instead of the robot's: as under `limits` in a job, in a file or as {velocity: 2}.",
         ),
     ] = None
-    columns: Annotated[
-        str | None,
-        typer.Option(
-            "--columns",
-            metavar="MAP",
-            help="What columns are, such as t=timestamp,q=target_q: prefixes or names.",
-        ),
-    ] = None
+    columns: ColumnMap = None
     rate: Annotated[
         str | None, typer.Option("--rate", metavar="HZ", help="Rows per second of a file without time.")
     ] = None
-    units: Annotated[
-        str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, as deg,mm.")
-    ] = None
-    topic: Annotated[
-        str | None,
-        typer.Option("--topic", metavar="T", help="MCAP: the topic.", show_default="/joint_states"),
-    ] = None
-    field: Annotated[
-        str | None,
-        typer.Option("--field", metavar="F", help="Of messages with several states, such as reference."),
-    ] = None
+    units: FileUnits = None
+    topic: TopicName = None
+    field: FieldName = None
     interpolate: Annotated[
         Literal["hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling"] | None,
         typer.Option(

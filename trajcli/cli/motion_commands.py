@@ -10,7 +10,19 @@ from typing import Annotated, Literal
 import typer
 
 from trajcli.cli.command import Command, CommandLine
-from trajcli.cli.options import Consumer, JobErrors, JobFile, RowTimes, robot_names, setting_paths
+from trajcli.cli.options import (
+    ColumnMap,
+    Consumer,
+    FieldName,
+    FileUnits,
+    JobErrors,
+    JobFile,
+    MotionForm,
+    RowTimes,
+    TopicName,
+    robot_names,
+    setting_paths,
+)
 
 MotionSource = Annotated[
     str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy, .npz; - is stdin.")
@@ -20,21 +32,6 @@ MotionOutput = Annotated[
     typer.Option(
         "--output", "-o", metavar="OUT", help="OUT.csv, .mcap, .jsonl or .yaml; else CSV to stdout."
     ),
-]
-MotionForm = Annotated[
-    Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"] | None,
-    typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
-]
-ColumnMap = Annotated[
-    str | None,
-    typer.Option("--columns", metavar="MAP", help="What columns are: t=timestamp,q=target_q,qd=target_qd."),
-]
-FileUnits = Annotated[
-    str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, such as deg,mm.")
-]
-TopicName = Annotated[str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.")]
-FieldName = Annotated[
-    str | None, typer.Option("--field", metavar="F", help="Of messages with several states: the one meant.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr but errors.")]
 Count = Annotated[str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")]

@@ -124,3 +124,20 @@ DigitsOption = Annotated[
     Literal["fixed", "full"],
     typer.Option("--digits", help="Of a CSV. fixed: nine decimals; full: every bit."),
 ]
+MotionForm = Annotated[
+    Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"] | None,
+    typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
+]
+ColumnMap = Annotated[
+    str | None,
+    typer.Option("--columns", metavar="MAP", help="What columns are: t=timestamp,q=target_q,qd=target_qd."),
+]
+FileUnits = Annotated[
+    str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, such as deg,mm.")
+]
+TopicName = Annotated[
+    str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.", show_default="/joint_states")
+]
+FieldName = Annotated[
+    str | None, typer.Option("--field", metavar="F", help="Of messages with several states: the one meant.")
+]
