@@ -198,3 +198,19 @@ def test_what_joins_the_rows_of_two_moves_is_on_the_path_of_neither(last: int) -
     moves = (np.arange(60) >= last).astype(np.int64)
     found = [each for each in deviations(places, 2, velocities, moves=moves) if each.row not in (35, 37)]
     assert bool(found) is (last == 30)
+
+
+@pytest.mark.parametrize("by", [1e-5, 2e-4, 4e-4])
+@pytest.mark.parametrize("corner", [0, 1, 2])
+def test_rows_right_beside_a_corner_are_on_its_sides(corner: int, by: float) -> None:
+    """Nearer to it than the places where the path is looked at first; a row across it is off by how far it is."""
+    places, ends = along(4, 401), np.vstack([START, CORNERS])
+    row = int(np.linalg.norm(places - ends[corner + 1], axis=1).argmin())
+    for k, end in ((row - 1, corner), (row + 1, corner + 2)):
+        way = ends[end] - ends[corner + 1]
+        places[k] = ends[corner + 1] + by * way / np.linalg.norm(way)
+    assert deviations(places, 4) == []
+    places[row - 1] += [0.0, 0.0, 3e-5]
+    assert [(each.row, each.value) for each in deviations(places, 4)] == [
+        (row, pytest.approx(3e-5, rel=1e-6))
+    ]
