@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
-from trajcli.geometry.paths.position import PositionCurve, Side, Smooth, Triple, inside
+from trajcli.geometry.paths.position import Parametrised, PositionCurve, Side, Smooth, Triple, inside
 from trajcli.geometry.power_series import series_exponential, series_product
 from trajcli.geometry.rotation import Array, Flags, axis_angle_from_matrix, check_rotation, exp
 
@@ -27,7 +27,7 @@ _RATE_NOISE = 1e-10  # rad/m, what remains of the difference of two orientations
 _NOISE = 1e-9  # a component of an axis as small as this says nothing by its sign
 
 
-class OrientationCurve(Protocol):
+class OrientationCurve(Parametrised, Protocol):
     """A rotation R(s), s from 0 to `length`.
 
     Attributes:
@@ -36,21 +36,6 @@ class OrientationCurve(Protocol):
         stops: Those of them where the rate w' jumps, or R: a law must stop there.
         jumps: Those of them where R jumps: the tool must turn there, or the path be refused.
     """
-
-    @property
-    def length(self) -> float:
-        """How far s goes."""
-        ...
-
-    @property
-    def breaks(self) -> Array:
-        """Where a derivative may jump."""
-        ...
-
-    @property
-    def stops(self) -> Array:
-        """Where a law must stop."""
-        ...
 
     @property
     def jumps(self) -> Array:

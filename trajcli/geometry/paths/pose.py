@@ -17,6 +17,7 @@ from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import OrientationCurve, turn_vectors
 from trajcli.geometry.paths.position import (
     SAME_POINT,
+    Parametrised,
     Pivot,
     PositionCurve,
     Side,
@@ -32,7 +33,7 @@ from trajcli.geometry.rotation import Array
 _SAME = 1e-9  # of the length: two breaks as near as this are one
 
 
-class PosePath(Protocol):
+class PosePath(Parametrised, Protocol):
     """A pose X(s), s from 0 to `length`; with a law s(t), v = X' sd and a = X'' sd^2 + X' sdd.
 
     Attributes:
@@ -44,23 +45,8 @@ class PosePath(Protocol):
     """
 
     @property
-    def length(self) -> float:
-        """How far s goes."""
-        ...
-
-    @property
     def pure_rotation(self) -> bool:
         """Whether the position is fixed."""
-        ...
-
-    @property
-    def breaks(self) -> Array:
-        """Where a derivative may jump."""
-        ...
-
-    @property
-    def stops(self) -> Array:
-        """Where a law must stop."""
         ...
 
     @property

@@ -17,14 +17,8 @@ SAME_POINT = 1e-9  # m, below which two points are one: no robot is that exact, 
 _ROUNDING = 1e-9  # of the length, by which laws end beside it
 
 
-class PositionCurve(Protocol):
-    """A curve p(s) in space, s its arc length from 0 to `length`.
-
-    Attributes:
-        length: m.
-        breaks: Inner arc lengths (k,), m, increasing, where a derivative may jump.
-        stops: Those of them where the direction jumps: a law must stop there.
-    """
+class Parametrised(Protocol):
+    """What a law s(t) leads along: how far s goes, and where that is not smooth."""
 
     @property
     def length(self) -> float:
@@ -40,6 +34,16 @@ class PositionCurve(Protocol):
     def stops(self) -> Array:
         """Where a law must stop."""
         ...
+
+
+class PositionCurve(Parametrised, Protocol):
+    """A curve p(s) in space, s its arc length from 0 to `length`.
+
+    Attributes:
+        length: m.
+        breaks: Inner arc lengths (k,), m, increasing, where a derivative may jump.
+        stops: Those of them where the direction jumps: a law must stop there.
+    """
 
     def evaluate(self, s: Array, side: Side = "right") -> Triple:
         """Return p (m), p' (1) and p'' (1/m), each of shape (N, 3), at s (N,); |p'| = 1.
