@@ -69,11 +69,17 @@ def _constants(robot: Robot) -> _Constants:
     return _Constants(base, along, across, slid, fixed, sign, angle[:, None], turning, sliding, slides)
 
 
-def _screw(a: float, cosine: float, sine: float) -> Array:
-    """Return the slide along x by a with the turn about it."""
-    return np.array(
+def _screw(a: float, cosine: float, sine: float, level: float = 1.0, tilt: float = 0.0) -> Array:
+    """Return the slide along x by a with the turn about it, then the tilt about y of that cosine and sine."""
+    turned = np.array(
         [[1.0, 0.0, 0.0, a], [0.0, cosine, -sine, 0.0], [0.0, sine, cosine, 0.0], [0.0, 0.0, 0.0, 1.0]]
     )
+    return turned @ [
+        [level, 0.0, tilt, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [-tilt, 0.0, level, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
 
 
 def poses_and_jacobians(robot: Robot, q: Array) -> tuple[Array, Array]:
