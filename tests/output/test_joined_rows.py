@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from tiers import few
 
 import trajcli
 from trajcli.grids import UniformGrid
-from trajcli.job.read import load_job
+from trajcli.job.read import job_from_text, load_job
+from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.output.delivery import joined_rows as module
 from trajcli.output.delivery.joined import joined_rows, rows_report, rows_that_keep, with_event
 from trajcli.output.write import grid_of
@@ -137,3 +139,40 @@ def test_plan_and_check_say_the_same(tmp_path: Path) -> None:
     excess = [{(f.kind, f.joint, f.move): f.excess for f in found.findings} for found in (own, read)]
     assert excess[0] == pytest.approx(excess[1], rel=1e-4)
     assert own.events == read.events
+
+
+LIFT = """\
+version: 1
+units: {angle: deg, length: mm}
+robot: ur5e
+limits: {acceleration: 800, jerk: 8000}
+start: {joints: [0, -90, 90, -90, -90, 20]}
+moves:
+  - planner: line
+    to: {from: here, offset: {xyz: [0, 0, 60]}}
+    law: {shape: jerk_limited, speed: 250, acceleration: 2000, jerk: 30000}
+  - {planner: jerk_limited, to: {joints: [40, -90, 95, -95, -60, 0]}}
+output: {rate: 50, columns: [t, q, qd, qdd, move]}
+"""
+
+
+def test_between_rows_of_two_moves_the_tool_has_left_its_path(tmp_path: Path) -> None:
+    """The last row of a line and the first of the next move are joined by a piece that is not the line's alone."""
+    from trajcli.judge.file import CheckOptions, check_file
+
+    plan, file = plan_job(job_from_text(LIFT)), tmp_path / "rows.csv"
+    trajcli.plan(LIFT).save(file)
+    own = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement()
+    read = check_file(str(file), CheckOptions(), plan).judgement
+    assert own is not None
+    excess = [{(f.kind, f.joint, f.move): f.excess for f in found.findings} for found in (own, read)]
+    assert excess[0] == pytest.approx(excess[1], rel=1e-4)
+    assert {kind for kind, _, _ in excess[1]} == {"acceleration", "jerk"}
+    # what leaves the line before its end is found
+    early = replace(
+        plan.moves[0].planned, tool=replace(plan.moves[0].planned.tool, tolerance=Tolerance(1e-9, 1e-9))
+    )
+    strict = replace(plan, moves=(replace(plan.moves[0], planned=early), *plan.moves[1:]))
+    found = joined_rows(strict, grid_of(plan), FORMATS["csv"]).judgement()
+    assert found is not None
+    assert ("deviation", 0) in {(f.kind, f.move) for f in found.findings}

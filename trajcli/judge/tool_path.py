@@ -24,6 +24,7 @@ _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there
 _ROWS = 1024  # at a time
 _INSIDE = 1e-6  # of the distance of samples: so far from a corner a place is on its side
+_LATE = 1e-9  # s: by so much the stamp of a row at the end of a move is beyond it
 _FURTHER = 2.0  # times the way of the tool from row to row: how far along the path it may get
 
 
@@ -82,12 +83,18 @@ class RecordedPath:
             pieces: Which ones.
             since: When each of them begins, s from the start of the move, shape (pieces,).
         """
-        half = 0.5 * window.lengths[pieces]
-        middle = horner(window.coefficients[:, pieces], half[:, None])
         law = self._motion.law
-        along = law.evaluate(np.clip(since, law.start, law.end))[:, 0]
+        own = np.flatnonzero(
+            since + window.lengths[pieces] <= law.end + _LATE
+        )  # of others the next move has part
+        chosen = pieces.start + own
+        if not chosen.size:
+            return
+        half = 0.5 * window.lengths[chosen]
+        middle = horner(window.coefficients[:, chosen], half[:, None])
+        along = law.evaluate(np.clip(since[own], law.start, law.end))[:, 0]
         slack = self._slack_of(middle, window)
-        self._judge(middle, window.t[pieces] + half, window.rows[pieces], slack, (along, half))
+        self._judge(middle, window.t[chosen] + half, window.rows[chosen], slack, (along, half))
 
     def _slack_of(self, q: Array, window: Intervals) -> Array:
         """Return by how much the tool may be off by the rounding of the rows, m and rad alike, (N,)."""
