@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from blend_cases import COUNTS, JOINTS, SEEDS, assert_continuous, assert_no_slivers, chords, polyline
+from counted_calls import calls_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
@@ -149,13 +148,8 @@ def test_wrong_input_is_refused(t, q, d, message):
 
 
 def test_the_cost_is_linear():
-    def seconds(m):
+    def calls(m):
         t, q = np.arange(m, dtype=float), np.random.default_rng(0).normal(size=(m, 6))
-        took = []
-        for _ in range(3):
-            begin = time.process_time()
-            blended(t, q, 0.2, exactly=True)
-            took.append(time.process_time() - begin)
-        return min(took)
+        return calls_of(lambda: blended(t, q, 0.2, exactly=True))
 
-    assert seconds(10_000) < 3 * 10 * max(seconds(1_000), 1e-3)
+    assert calls(10_000) < 1.5 * 10 * calls(1_000)
