@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from pathlib import Path
 
 import dead_code_rules
 import file_rules
@@ -87,3 +88,14 @@ def test_files_of_tests_have_names_of_their_own() -> None:
     """Pytest refuses a second file of a name."""
     names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
     assert [name for name, count in names.items() if count > 1] == []
+
+
+CLOCK = re.compile(r"\b(?:process_time|perf_counter)(?:_ns)?\(")
+
+
+def test_no_test_measures_time() -> None:
+    """It would fail on a busy machine: `calls_of` counts calls, and the benchmarks measure."""
+    assert CLOCK.search("start = time.process_time()")
+    files = [path for path in (ROOT / "tests").rglob("*.py") if path != Path(__file__)]
+    assert files
+    assert [str(path) for path in files if CLOCK.search(path.read_text(encoding="utf-8"))] == []
