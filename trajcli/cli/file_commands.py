@@ -153,7 +153,7 @@ class ProfilesCommand(Command):
 
 
 class SchemaCommand(Command):
-    """Print a JSON Schema, for completion and checking in an editor."""
+    """Print a JSON Schema: editors read it where `# yaml-language-server: $schema=FILE` heads a job."""
 
     example = "trajcli schema job"
 
