@@ -18,6 +18,19 @@ def finding(index: int) -> Finding:
     return Finding("velocity", "j1", 1.0, 0.5, 0.0, row=index)
 
 
+def add(found: Collector, part: np.ndarray, k: int, rows: tuple[np.ndarray, ...]) -> None:
+    """Add the rows of a part that are of the group k; of all are given moves, joints, excess and group."""
+    moves, joints, excess, group = (values[part] for values in rows)
+    severity, certainty = GROUPS[k]
+
+    def make(row: int) -> Finding:
+        return finding(int(part[row]))
+
+    found.add(
+        "velocity", moves, joints, excess, make, severity=severity, certainty=certainty, chosen=group == k
+    )
+
+
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("blocks", [1, 3, 40])
 def test_the_worst_of_each_joint_and_move_is_kept_and_all_are_counted(seed: int, blocks: int) -> None:
@@ -27,17 +40,8 @@ def test_the_worst_of_each_joint_and_move_is_kept_and_all_are_counted(seed: int,
     group = random.integers(0, 3, 40)
     found = Collector()
     for part in np.array_split(np.arange(40), blocks):
-        for k, (severity, certainty) in enumerate(GROUPS):
-            found.add(
-                "velocity",
-                moves[part],
-                joints[part],
-                excess[part],
-                lambda row, part=part: finding(int(part[row])),
-                severity=severity,
-                certainty=certainty,
-                chosen=group[part] == k,
-            )
+        for k in range(len(GROUPS)):
+            add(found, part, k, (moves, joints, excess, group))
     expected = set()
     for joint, move in product((-1, 0, 1), repeat=2):
         own = [k for k in range(40) if (joints[k], moves[k]) == (joint, move)]
@@ -106,18 +110,9 @@ def test_of_all_moves_together_the_worst_of_each_certainty_is_kept(seed: int) ->
     joints, moves = random.integers(-1, 2, 40), np.sort(random.integers(-1, 3, 40))
     excess, group = random.integers(-3, 4, 40) / 2.0, random.integers(0, 3, 40)
     found = Collector(by_move=False)
-    for move, (k, (severity, certainty)) in product((-1, 0, 1, 2), enumerate(GROUPS)):
+    for move, k in product((-1, 0, 1, 2), range(len(GROUPS))):
         part = np.flatnonzero(moves == move)
-        found.add(
-            "velocity",
-            moves[part],
-            joints[part],
-            excess[part],
-            lambda row, part=part: finding(int(part[row])),
-            severity=severity,
-            certainty=certainty,
-            chosen=group[part] == k,
-        )
+        add(found, part, k, (moves, joints, excess, group))
     expected = set()
     for joint, k in product((-1, 0, 1), range(3)):
         alike = [row for row in range(40) if (joints[row], group[row]) == (joint, k)]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from two_moves import TWO_MOVES
 
 from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text
@@ -15,16 +16,6 @@ from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.byte_source import ByteSource
 
-TWO_MOVES = """
-version: 1
-units: {angle: deg, length: mm}
-robot: ur5e
-limits: {velocity: 180, acceleration: 800, jerk: 8000, tcp: {speed: 200, acceleration: 1000}}
-start: {joints: [0, -90, 90, -90, -90, 20]}
-moves:
-  - {planner: jerk_limited, to: {joints: [10, -90, 95, -95, -90, 0]}}
-  - {planner: line, to: {xyz: [400, 0, 350]}, law: {shape: jerk_limited, jerk: 10000}}
-"""
 TOOLS = """
 version: 1
 units: {angle: deg}

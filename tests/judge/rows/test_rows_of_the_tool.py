@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from tiers import few
+from two_moves import TWO_MOVES as JOB
 
 from trajcli.columns import group_of, parse_column
 from trajcli.errors import InputError
@@ -20,16 +21,6 @@ from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 
 Rows = NDArray[np.float64]
-JOB = """
-version: 1
-units: {angle: deg, length: mm}
-robot: ur5e
-limits: {velocity: 180, acceleration: 800, jerk: 8000, tcp: {speed: 200, acceleration: 1000}}
-start: {joints: [0, -90, 90, -90, -90, 20]}
-moves:
-  - {planner: jerk_limited, to: {joints: [10, -90, 95, -95, -90, 0]}}
-  - {planner: line, to: {xyz: [400, 0, 350]}, law: {shape: jerk_limited, jerk: 10000}}
-"""
 EVERYTHING = "[t, q, qd, qdd, pose, twist, twistd, path, move]"
 ALONE = ("[t, pose]", "[t, pose, twist]", "[t, twist, twistd]", "[t, twist]", "[t, path]", "[t, path, move]")
 
