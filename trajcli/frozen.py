@@ -57,11 +57,7 @@ def _completed(
     values: tuple[Any, ...],
     named: dict[str, Any],
 ) -> tuple[Any, ...]:
-    """Return a value for each of the names: those given in order, those given by name, and defaults.
-
-    Raises:
-        TypeError: When one does not fit, or is missing and has no default.
-    """
+    """Return a value for each of the names: those given in order, those given by name, and defaults."""
     rest = names[len(values) :]
     if len(values) > len(names) or not named.keys() <= set(rest):
         raise TypeError(f"{cls.__name__} takes {', '.join(names)}, each once")

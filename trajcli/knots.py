@@ -230,12 +230,7 @@ def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, 
 
 
 def _steps(curve: PiecewisePolynomial, kept: NDArray[np.intp]) -> Array:
-    """Return the step of the acceleration at some breaks, shape (k, n); 0 for none, and at the ends.
-
-    Args:
-        curve: The curve.
-        kept: Which breaks, the first and the last among them; what lies between two belongs to the first.
-    """
+    """Return the step of the acceleration at the breaks `kept`, shape (k, n); 0 for none, and at the ends."""
     steps: Array = np.zeros((kept.size, curve.dimension))
     if kept.size <= 2:
         return steps

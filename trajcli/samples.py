@@ -135,14 +135,7 @@ def _of_tool(
 
 
 def _efforts(trajectory: Trajectory, robot: Robot | None, owner: NDArray[np.intp], motion: Array) -> Array:
-    """Return the efforts of the joints with what the tool carries in each span, shape (N, n), N m or N.
-
-    Args:
-        trajectory: Whose spans know what is carried.
-        robot: Whose efforts.
-        owner: Span of each row, shape (N,).
-        motion: q, qd and qdd, SI, shape (N, 3 or more, n).
-    """
+    """Return the efforts of the joints with their loads, (N, n), of q, qd and qdd (N, 3 or more, n), SI."""
     from trajcli.dynamics.newton_euler import InverseDynamics
 
     if robot is None:

@@ -242,7 +242,6 @@ def load_robot(name: str | Path) -> Arm:
 
 
 def _loaded(job: str | Path | Mapping[str, Any] | LoadedJob, overrides: Sequence[str]) -> LoadedJob:
-    """Return a job that is read from whatever holds it."""
     if isinstance(job, Path) or (isinstance(job, str) and not _is_yaml(job)):
         return load_job(job, overrides)
     if overrides:

@@ -151,7 +151,6 @@ def _document(content: bytes, file: str) -> Document:
 
 
 def _planned(document: Document) -> SweepPoint:
-    """Return what comes of a job that has a motion."""
     with np.errstate(all="ignore"):  # what is not finite is for the checks to find
         plan, _ = delivered(job_of_document(document))
         findings = plan.verdict.findings
@@ -267,12 +266,7 @@ def _drawn(count: int, samples: int, seed: int) -> tuple[int, ...]:
 
 
 def _check_paths(document: Document, axes: Sequence[Axis]) -> None:
-    """Refuse an axis of which no value can stand in the job, where the job can be read without it.
-
-    Raises:
-        InputError: What is wrong with its first value.
-        FileError: When a file of the job cannot be read.
-    """
+    """Refuse an axis of which no value can stand in the job, where the job can be read without it."""
     if _refusal(document, ()) is not None:
         return
     for axis in axes:
@@ -289,11 +283,7 @@ def _check_paths(document: Document, axes: Sequence[Axis]) -> None:
 
 
 def _check_name(document: Document, axis: Axis) -> None:
-    """Refuse an axis that would add a point, a frame, a tool or a sequence, which nothing in the job names.
-
-    Raises:
-        InputError: Names the nearest that the job has.
-    """
+    """Refuse an axis that would add a point, frame, tool or sequence, which nothing in the job names."""
     section, *rest = axis.setting(0).path
     if section not in _NAMED or not rest or document.node((section, rest[0])) is not None:
         return
@@ -306,7 +296,6 @@ def _check_name(document: Document, axis: Axis) -> None:
 
 
 def _refusal(document: Document, settings: tuple[Setting, ...]) -> InputError | None:
-    """Return why a job with settings cannot be read."""
     try:
         job_of_document(overridden(document, settings))
     except InputError as error:

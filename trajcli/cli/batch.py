@@ -160,7 +160,6 @@ def _say_why(outcome: JobOutcome, aside: str | None, errors: ErrorForm) -> None:
 
 
 def _error(outcome: JobOutcome) -> TrajcliError:
-    """Return the error that a job failed with."""
     known = (InputError, VerificationError, PlanningError, FileError)
     kind = next((each for each in known if each.exit_code == outcome.exit_code), TrajcliError)
     return kind(*outcome.problems)

@@ -86,7 +86,6 @@ def run_check(options: CheckCommand) -> int:
 def _form(
     options: CheckCommand, files: Sequence[str]
 ) -> Literal["table", "json", "junit", "sarif", "github"]:
-    """Return what is printed."""
     if files.count("-") > 1:
         raise InputError("standard input can be read once")
     if options.as_json and options.form not in ("table", "json"):
@@ -101,7 +100,6 @@ def _print_annotations(problems: Sequence[Problem], form: AnnotationForm, files:
 
 
 def _judged(file: str, options: CheckCommand) -> tuple[CheckedFile, MotionReference | None]:
-    """Return a file with its judgement, and with how it compares with peers where that is asked."""
     checked = check_file(file, options.part(CheckOptions), delivered=_delivered)
     if not options.reference:
         return checked, None
@@ -150,7 +148,6 @@ def _view(beside: MotionReference) -> dict[str, Any]:
 
 
 def _beside(beside: MotionReference, units: Units) -> Iterator[str]:
-    """Yield how a motion compares with peers."""
     from trajcli.cli.plan import violation_lines
     from trajcli.job.reports.part import in_units
 
@@ -207,7 +204,6 @@ def _table(checked: CheckedFile, findings: Sequence[Finding]) -> Iterator[list[s
 
 
 def _amount(checked: CheckedFile, finding: Finding, name: str, value: float | None) -> str:
-    """Return a number of a finding in the units of the reader."""
     amount = finding.amounts.get(name)
     if isinstance(amount, Amount):
         return _say(checked)(amount)

@@ -51,7 +51,6 @@ def _behind_commas(names: Iterable[str], incomplete: str) -> list[str]:
 
 
 def _sources(ctx: typer.Context) -> list[str]:
-    """Return the files that the command line names so far."""
     given = [ctx.params.get(key) for key in ("job", "sources", "files")]
     named = [name for value in given if value for name in ([value] if isinstance(value, str) else value)]
     return [*named, *map(str, ctx.args)]

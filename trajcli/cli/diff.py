@@ -81,11 +81,7 @@ def _without(a: str, b: str, lacking: str) -> tuple[dict[str, Any], str]:
 
 
 def _pairs(others: Sequence[str], folder: str) -> Iterator[tuple[str, str]]:
-    """Yield pairs of files of the same names; of two folders also those that one of them lacks.
-
-    Raises:
-        InputError: When the last name is none of a folder.
-    """
+    """Yield pairs of files of the same names; of two folders also those that one of them lacks."""
     if not Path(folder).is_dir():
         raise InputError(f"several files are compared with those of a folder, and {folder} is none")
     for other in others:

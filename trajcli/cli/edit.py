@@ -149,7 +149,6 @@ def run_retime(options: RetimeCommand) -> int:
 
 
 def _stretch(stretch: Stretch, say: Callable[..., str]) -> str:
-    """Return by what factor a motion is longer or shorter, and what binds it."""
     moves = stretch.moves or ()
     whose = f"move{'s' * (len(moves) > 1)} {', '.join(map(str, moves))}: " if moves else ""
     if stretch.binding is None:

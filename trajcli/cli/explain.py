@@ -176,7 +176,6 @@ def _lines(explained: Explanation, plan: Plan, *, peers: bool = False) -> Iterat
 
 
 def _flown_by(explained: Explanation) -> Iterator[str]:
-    """Yield the line about what flying by corners gained, and its bound."""
     flyby = explained.flyby
     if flyby is not None and flyby.zones:
         bound = "" if flyby.bound is None else f"; bound: {flyby.bound.duration:.6g} s ({flyby.bound.method})"
@@ -184,7 +183,6 @@ def _flown_by(explained: Explanation) -> Iterator[str]:
 
 
 def _zones(explained: Explanation, move: int) -> Iterator[str]:
-    """Yield a line about the zone at the end of a move."""
     for zone in () if explained.flyby is None else explained.flyby.zones:
         if zone.move != move:
             continue

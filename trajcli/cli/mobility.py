@@ -42,7 +42,6 @@ def run_mobility(options: MobilityCommand) -> int:
 
 
 def _linkage(options: MobilityCommand) -> Linkage:
-    """Return the linkage that the options describe."""
     described = options.links is not None or options.joints is not None
     if options.robot is not None:
         if described:

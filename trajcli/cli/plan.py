@@ -143,14 +143,12 @@ def _wanted(loaded: LoadedJob, options: PlanCommand) -> tuple[LoadedJob, Profile
 
 
 def _made(wanted: tuple[LoadedJob, Profile, str], form: StreamFormat, options: PlanCommand) -> ForConsumer:
-    """Return the plan for a consumer."""
     from trajcli.output.delivery.for_consumer import Writing, plan_for
 
     return plan_for(*wanted, Writing(form, options.digits, _log_options(options)))
 
 
 def _log_options(options: PlanCommand) -> LogOptions | None:
-    """Return what is said about a log; None where nothing is."""
     if options.topics is None and options.epoch is None and options.compression is None:
         return None
     from trajcli.output.recording import LogOptions
@@ -250,7 +248,6 @@ def _check_outputs(options: PlanCommand) -> None:
 
 
 def _outputs(options: PlanCommand) -> Iterator[tuple[str, str]]:
-    """Yield what is written, and where to."""
     if not options.no_output:
         yield "the rows", options.output or "-"
     for name, path in (("--report", options.report), ("--resolved", options.resolved)):
@@ -393,7 +390,6 @@ def summary(plan: Plan, rows: int, *, details: bool = False) -> str:
 
 
 def _flown(flyby: FlyBy) -> str:
-    """Return what flying by corners gained."""
     count, saved = len(flyby.zones), 1 - flyby.duration / flyby.stopping
     corners = f"flies by {count} corner{'s' * (count != 1)}"
     gained = f"{100 * saved:.3g} % less than the {flyby.stopping:.6g} s of stopping there"

@@ -117,11 +117,7 @@ def _files_and_joints(words: Sequence[str], joints: Sequence[str]) -> tuple[list
 
 
 def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the jobs, at most two, and the files of rows.
-
-    Raises:
-        InputError: When there are more jobs, standard input is named twice, or `--set` has no job.
-    """
+    """Return the jobs, at most two, and the files of rows."""
     if files.count("-") > 1:
         raise InputError("only one of the files can be standard input")
     jobs = [name for name in files if _is_job(name)]

@@ -126,7 +126,6 @@ def _in_powers(row: PolynomialReport, order: int) -> str:
 
 
 def _derivative(coefficients: Sequence[float], order: int) -> Sequence[float]:
-    """Return the ascending coefficients of a derivative."""
     for _ in range(order):
         coefficients = [power * c for power, c in enumerate(coefficients)][1:]
     return coefficients

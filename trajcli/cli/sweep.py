@@ -92,7 +92,6 @@ def _print_table(table: SweepTable, form: Form) -> None:
 
 
 def _sweep(options: SweepCommand) -> Sweep:
-    """Return what is planned."""
     samples, seed = (_count(*each) for each in (("--samples", options.samples), ("--seed", options.seed)))
     if seed is not None and samples is None:
         raise InputError("--seed is about points drawn by chance", hint="say how many with --samples N")
@@ -133,5 +132,4 @@ def _say_what_came(table: SweepTable, progress: Progress, options: SweepCommand)
 
 
 def _where(table: SweepTable, row: SweepRow) -> str:
-    """Return the values of a row with their paths."""
     return utf8(", ".join(f"{path}={value}" for path, value in zip(table.paths, row.values, strict=True)))

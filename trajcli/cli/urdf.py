@@ -44,7 +44,6 @@ def run_urdf(options: UrdfCommand) -> int:
 
 
 def _write(text: str, file: str, output: str) -> None:
-    """Write the robot file, whole or not at all."""
     same = identity(output)
     if same is not None and file != "-" and same == identity(file, 0):
         raise InputError(f"the robot file to {output} would overwrite the URDF", hint="name another file")

@@ -65,13 +65,7 @@ def write_comparison(first: str, second: str, output: str, robot: str | None) ->
 
 @frozen
 class _Shown:
-    """A motion to be shown.
-
-    Attributes:
-        scene: Of it.
-        said: What it is and its verdict, in a line.
-        problems: Makes the error of what is wrong with it; None where nothing is.
-    """
+    """A motion to be shown: its scene, a line with its verdict, and what makes the error of what is wrong."""
 
     scene: dict[str, Any]
     said: str

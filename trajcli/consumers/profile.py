@@ -154,7 +154,6 @@ def read_profile(name: str, checks: Mapping[str, Mapping[str, Any]], folder: Pat
 
 
 def _flaws(document: Document, checks: Mapping[str, Mapping[str, Any]]) -> Iterator[Problem]:
-    """Yield what is wrong with the file of a profile."""
     plain = document.plain()
     yield from _of_keys(document, (), plain, _HEAD, ("title", "sources", "rules"))
     for key, kind in _HEAD.items():
@@ -179,7 +178,6 @@ def _flaws(document: Document, checks: Mapping[str, Mapping[str, Any]]) -> Itera
 
 
 def _of_rows(document: Document, rows: Mapping[str, Any]) -> Iterator[Problem]:
-    """Yield what is wrong with the rows that a consumer takes."""
     yield from _of_keys(document, ("rows",), rows, _ROWS, ())
     columns = rows.get("columns")
     if columns is not None and not (isinstance(columns, list) and columns and {*columns} <= {*GROUPS}):
@@ -194,7 +192,6 @@ def _of_rows(document: Document, rows: Mapping[str, Any]) -> Iterator[Problem]:
 def _of_rule(
     document: Document, index: int, plain: Mapping[str, Any], checks: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[Problem]:
-    """Yield what is wrong with one rule."""
     at, rule = ("rules", index), plain["rules"][index]
     flaws = [*_of_keys(document, at, rule, _RULE, ("id", "severity", "text", "source"))]
     yield from flaws

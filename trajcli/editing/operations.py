@@ -121,7 +121,6 @@ def _between_rows(motion: EditedMotion, times: Array) -> dict[str, Array]:
 
 
 def _of_curve(motion: EditedMotion) -> tuple[str, ...]:
-    """Return the quantities that the curve takes from the rows."""
     rows = motion.rows
     return ORDERS[: 1 + (rows.qd is not None) * (1 + (rows.qdd is not None))]
 

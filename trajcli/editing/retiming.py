@@ -190,11 +190,7 @@ def stretched(rows: RecordedMotion, factor: float) -> RecordedMotion:
 
 
 def _ranges(motion: EditedMotion) -> list[tuple[slice, tuple[int, ...]]]:
-    """Return the rows of moves, borders in both, and their indices; moves that meet in motion are together.
-
-    Raises:
-        InputError: When the file has no moves.
-    """
+    """Return the rows of moves, borders in both, and their indices; of moves that meet in motion together."""
     move = motion.rows.move
     if move is None:
         hint = "leave --per-move out, or plan with `columns: [t, q, qd, qdd, move]`"

@@ -194,11 +194,7 @@ def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tu
 
 
 def _knots(motion: EditedMotion) -> Knots:
-    """Return the rows as knots: states at whole nanoseconds from the first one on.
-
-    Raises:
-        InputError: When two rows are in one nanosecond.
-    """
+    """Return the rows as knots: states at whole nanoseconds from the first one on."""
     rows, states = motion.rows, _states(motion)
     nanoseconds = np.rint((rows.t - rows.t[0]) * _PER_SECOND).astype(np.int64)
     if (np.diff(nanoseconds) <= 0).any():

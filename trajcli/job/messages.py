@@ -309,7 +309,6 @@ def _field_names(model: type[BaseModel], loc: FieldPath) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:
-    """Return the model of the mapping at `loc`."""
     current = model
     for step in loc:
         if isinstance(step, str) and step in PLANNERS:

@@ -102,7 +102,6 @@ def overridden(document: Document, settings: Sequence[Setting]) -> Document:
 
 
 def _patched(document: Document, setting: Setting) -> PatchedDocument:
-    """Return the document with one setting put in."""
     patch = parse_document(setting.value, setting.option, any_root=True)
     root, depth = _with(document.root, setting.path, patch.root, setting.option), len(setting.path)
     before = document.patches if isinstance(document, PatchedDocument) else {}

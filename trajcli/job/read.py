@@ -380,7 +380,6 @@ def _plain(node: Node | None) -> Any:  # noqa: ANN401
 
 
 def _texts(node: Node | None) -> Iterator[str]:
-    """Yield every text below a node."""
     value = None if node is None else node.value
     if isinstance(value, str):
         yield value
@@ -396,7 +395,6 @@ def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
 
 
 def _recorded_poses(document: Document, path: str) -> RecordedPoses:
-    """Return the recorded poses of a path."""
     from trajcli.job.files.recorded_poses import read_poses
 
     return read_poses(path, document)

@@ -69,7 +69,6 @@ def judge_arrays(
 
 
 def _checked(name: str, values: np.ndarray) -> Array:
-    """Return numbers as float64."""
     if values.dtype.kind not in "fiu":
         raise InputError(f"{name}: expected an array of numbers, got {values.dtype}")
     numbers = values.astype(np.float64)

@@ -128,7 +128,6 @@ class MotionJudge:
     """A judgement in the making: rows are seen block by block, two intervals at the end of each wait."""
 
     def __init__(self, requirements: Requirements, *, snap: bool = True) -> None:
-        """Begin with no rows."""
         self._requirements, self._snap, self._worst = requirements, snap, Collector()
         robot = requirements.robot
         self._axes = robot
@@ -333,7 +332,6 @@ class MotionJudge:
 
 
 def _joined(blocks: list[RecordedMotion]) -> RecordedMotion:
-    """Return neighbouring rows as one block."""
     if len(blocks) == 1:
         return blocks[0]
     names = ("t", "q", "qd", "qdd", "move")
@@ -389,13 +387,7 @@ def _causes(findings: list[Finding]) -> list[Finding]:
 
 
 def _with_unit_hint(findings: Sequence[Finding], axes: NamedJoints, farthest: float) -> list[Finding]:
-    """Return findings, the first of which says that the file may be in degrees where its values look like it.
-
-    Args:
-        findings: The worst first.
-        axes: The joints.
-        farthest: The largest value of a revolute joint, rad.
-    """
+    """Return findings, the first of which says that the file looks like degrees (`farthest` in rad)."""
     found = list(findings)
     if farthest <= _TURNS:
         return found

@@ -183,7 +183,6 @@ class _Judge:
         self._add("orientation", angle, 2.0 * slack, motion, "is turned by {value} from what the joints make")
 
     def _compare_rates(self, motion: RecordedMotion, values: Array, errors: list[Array]) -> None:
-        """Compare velocities and accelerations of the tool with those of the joints."""
         assert motion.qd is not None  # noqa: S101
         speed, text = np.abs(motion.qd).sum(axis=1), "is {value} from what the joints make"
         slack = self._arm * (errors[1] + errors[0] * speed) + self._table.half("twist") + _EXACT

@@ -141,7 +141,6 @@ class NamedValues(tuple[float, ...]):
         return {k: value for k, (value, named) in enumerate(zip(self, self.named, strict=True)) if named}
 
     def __getnewargs__(self) -> tuple[tuple[float, ...], tuple[bool, ...]]:
-        """Return what copies are made of."""
         return tuple(self), self.named
 
 

@@ -170,11 +170,7 @@ def _of_name(name: str, validate: core_schema.ValidatorFunctionWrapHandler, cont
 
 
 def _names_from(name: str, context: ReadingContext) -> list[str]:
-    """Return a name and the names that it stands for, the last one that of a state.
-
-    Raises:
-        FlawError: When there is no such point, or a point is named by itself.
-    """
+    """Return a name and the names that it stands for, the last one that of a state."""
     points, names = context.points, [name]
     if name not in points:
         raise FlawError(f"there is no point '{name}'", hint=_known(name, points))
@@ -273,14 +269,7 @@ def _name_in(value: Mapping[str, Any], context: ReadingContext) -> str:
 
 
 def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: ReadingContext) -> _Fields:
-    """Return the fields of a state that is relative to a point, or to where the arm stands.
-
-    Args:
-        value: The state.
-        name: Of the point, or "here".
-        point: Its fields; None for "here".
-        context: With all points.
-    """
+    """Return the fields of a state that is relative to a point, or to where the arm stands."""
     offset, axes = _offset(value, context), _axes(value.get("frame", "tool"), context)
     for key in value:
         every = key == "joints" and not isinstance(value[key], Mapping)

@@ -111,11 +111,7 @@ def schema_of_signals() -> JsonSchemaValue:
 
 
 def _read_one(value: Any, context: ReadingContext) -> SignalAt:  # noqa: ANN401
-    """Return one signal, in SI.
-
-    Raises:
-        FlawError: When it is none, with each flaw.
-    """
+    """Return one signal, in SI."""
     form = "{signal: NAME, value: NUMBER, when: enter | nearest | leave | {path: L}, before: s}"
     if not isinstance(value, Mapping):
         raise FlawError(f"expected {form}, got {shown(value)}")

@@ -89,11 +89,7 @@ class SignalsField(FieldType):
 
 
 def _read_parts(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any]:
-    """Return what a mapping limits, in SI.
-
-    Raises:
-        FlawError: When it names something else, or nothing.
-    """
+    """Return what a mapping limits, in SI."""
     unknown = [key for key in value if key not in _PARTS]
     if unknown or not value:
         listed = ", ".join(_PARTS)

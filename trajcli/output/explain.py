@@ -82,14 +82,7 @@ def explanation(
 
 
 def _move(plan: Plan, index: int, report: MoveReport, *, derivatives: bool) -> ExplainedMove:
-    """Return what there is to say about a move.
-
-    Args:
-        plan: The whole.
-        index: Number of the move among the moves.
-        report: Of the move, in the units of the job.
-        derivatives: Whether polynomials come with those of velocity and acceleration.
-    """
+    """Return what there is to say about a move."""
     move, units = plan.moves[index], plan.loaded.units
     names, planned = move.robot.joint_names, move.planned
     arrivals, tool = planned.arrivals, planned.tool
@@ -124,13 +117,7 @@ def _move(plan: Plan, index: int, report: MoveReport, *, derivatives: bool) -> E
 def _waypoints(
     move: PlannedMove, reports: Sequence[WaypointReport] | None, units: Units
 ) -> tuple[ExplainedWaypoint, ...] | None:
-    """Return the points that a move passes, times from its start.
-
-    Args:
-        move: The move.
-        reports: Of its points, in the units of the job.
-        units: Of the job.
-    """
+    """Return the points that a move passes, times from its start."""
     points = move.planned.via_points
     if points is None or reports is None:
         return None
@@ -212,7 +199,6 @@ def _resolved(pose: ResolvedPose, plan: Plan, robot: Robot) -> PoseReport:
 
 
 def _path(tool: ToolMotion, units: Units, *, derivatives: bool) -> PathReport:
-    """Return the path of a tool and the law along it, in the units of the job."""
     segments, corners = _drawing(tool)
     length = float(tool.law.piece_ends()[1][-1, 0])
     unit = "rad" if tool.pure_rotation else "m"
@@ -227,7 +213,6 @@ def _path(tool: ToolMotion, units: Units, *, derivatives: bool) -> PathReport:
 
 
 def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]:
-    """Return the segments of a path and the corners between them."""
     from trajcli.geometry.paths.chain import Chain
     from trajcli.geometry.paths.pose import PoseCurve, Screw
 
@@ -246,7 +231,6 @@ def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]
 
 
 def _weave(tool: ToolMotion) -> WeaveReport | None:
-    """Return how the tool weaves about its path; None where it does not."""
     if tool.path is None or not tool.path.weaves:
         return None
     weave: Any = getattr(tool.path.poses, "position", None)

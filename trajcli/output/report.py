@@ -110,7 +110,6 @@ def report_of(
 
 
 def _signals(plan: Plan) -> list[SignalReport]:
-    """Return the signals as they are set, by time."""
     named = [(signal.name, change) for signal in plan.trajectory.signals for change in signal.changes]
     return [
         SignalReport(name=name, value=change.value, move=change.move, time=change.time)
@@ -119,7 +118,6 @@ def _signals(plan: Plan) -> list[SignalReport]:
 
 
 def _flyby(plan: Plan) -> FlyByReport | None:
-    """Return what flying by corners gained; None where no zone is named."""
     if plan.flyby is None:
         return None
     from trajcli.output.flyby_report import flyby_report
@@ -193,13 +191,7 @@ def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport
 def _at_limit_of(
     move: PlannedMove, peaks: Sequence[Peaks], uses: Sequence[ApproachUse]
 ) -> list[AtLimitReport]:
-    """Return for how long a move is at each of its limits, the longest first.
-
-    Args:
-        move: The move.
-        peaks: Of position and its three derivatives over it.
-        uses: Of its limits of the velocity by position.
-    """
+    """Return for how long a move is at each of its limits, the longest first."""
     names = move.robot.joint_names
     return [
         AtLimitReport(
@@ -250,7 +242,6 @@ def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport
 
 
 def _by_position(plan: Plan, index: int) -> list[ByPositionReport]:
-    """Return where the joints of a move use most of their limits of velocity by position."""
     names, types = plan.trajectory.joint_names, plan.trajectory.joint_types
     units, lengths = joint_units(types, 1), joint_units(types)
     return [
@@ -269,7 +260,6 @@ def _by_position(plan: Plan, index: int) -> list[ByPositionReport]:
 
 
 def _waypoints(move: PlannedMove, span: Span) -> tuple[WaypointReport, ...] | None:
-    """Return when each point is passed, and at what distance."""
     points = move.planned.via_points
     if points is None:
         return None
@@ -282,13 +272,7 @@ def _waypoints(move: PlannedMove, span: Span) -> tuple[WaypointReport, ...] | No
 
 
 def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideReport, ...] | None:
-    """Return the joints that leave the range of the waypoints, above and below, and how far.
-
-    Args:
-        move: The move.
-        verdict: Of the whole trajectory.
-        index: Number of the move among the moves.
-    """
+    """Return the joints that leave the range of the waypoints, above and below, and how far."""
     points = move.planned.via_points
     if points is None:
         return None
@@ -309,7 +293,6 @@ def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideRe
 
 
 def _fastest(move: PlannedMove, span: Span) -> FastestReport | None:
-    """Return how near a motion that was searched for is to the fastest; None for other moves."""
     known = move.planned.certificate
     if known is None:
         return None

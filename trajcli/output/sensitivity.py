@@ -47,7 +47,6 @@ def _totals(savings: Sequence[Saving], plan: Plan) -> list[SavingReport]:
 
 
 def _report(savings: Sequence[Saving], plan: Plan) -> SavingReport:
-    """Return the report of one limit in some moves."""
     first, known = savings[0], [one.saved for one in savings if one.saved is not None]
     duration = math.fsum(plan.moves[one.move].duration for one in savings)
     saved = None if len(known) < len(savings) else math.fsum(known)

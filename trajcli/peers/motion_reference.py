@@ -42,13 +42,7 @@ class MotionReference:
 
 @frozen
 class _Outline:
-    """What a comparison needs of a motion.
-
-    Attributes:
-        first: Its first row, alone.
-        last: Its last row, alone.
-        points: Positions of rows, evenly chosen, shape (m, n).
-    """
+    """What a comparison needs of a motion: its first and last row, and positions of some rows, (m, n)."""
 
     first: RecordedMotion
     last: RecordedMotion

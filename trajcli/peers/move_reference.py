@@ -65,7 +65,6 @@ def bound_report(bound: LowerBound | NoBound, duration: float, robot: Robot) -> 
 
 
 def _violations(breaches: Sequence[LimitBreach], robot: Robot) -> list[PeerViolation]:
-    """Return the reports of limits that a peer breaks."""
     return [
         PeerViolation(
             joint=robot.joint_names[breach.joint],
@@ -141,7 +140,6 @@ def _common_unit(robot: Robot) -> str:
 
 
 def _use(use: LimitUse | None, robot: Robot) -> LimitUseReport | None:
-    """Return the report of the limit of which a motion uses most; None where there is none."""
     if use is None:
         return None
     name = robot.joint_names[use.joint]

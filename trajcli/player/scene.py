@@ -98,7 +98,6 @@ def _rows_and_loads(
 
 
 def _marks(plan: Plan) -> dict[str, Any]:
-    """Return what is taken up and left, zones and signals."""
     from trajcli.player.marks import marks_of, signals_of_plan, zones_of
 
     zones = zones_of(plan) if plan.loaded.robot.convention else []
@@ -313,7 +312,6 @@ def order_of(kind: str) -> int | None:
 
 
 def _event(plan: Plan, event: Event) -> dict[str, Any]:
-    """Return an event with the title of its move."""
     time = 0.0 if event.move is None else plan.trajectory.spans[event.move].start
     label = "" if event.move is None else f"{plan.loaded.called(event.move)}:"
     return {"time": time, "label": label, "message": event.message}

@@ -105,7 +105,6 @@ def _row_height(block: PanelBlock) -> float:
 
 
 def _height(block: PanelBlock, borders: MoveBorders | None, width: float) -> float:
-    """Return the height of a block with all its text."""
     head = _LINE * bool(block.headings) + _strip(block, borders)
     return head + _rows(block) * _row_height(block) + AXIS * block.over_time + BELOW
 
@@ -184,7 +183,6 @@ def _draw_panel(frame: PanelFrame, panel: Panel, note: str, *, numbered: bool) -
 
 
 def _draw_marks(frame: PanelFrame, panel: Panel) -> None:
-    """Draw waypoints, virtual points and findings."""
     if panel.findings.size:
         dots = {"color": "black", "linewidth": 0.7, "linestyle": (0, (1, 2))}
         frame.uprights(np.unique(panel.findings[:, 0]), "finding-times", **dots)

@@ -146,7 +146,6 @@ def _draw_space(
     box: tuple[float, float, float, float],
     ranges: list[tuple[float, float]],
 ) -> None:
-    """Draw the path in space."""
     from mpl_toolkits.mplot3d import Axes3D
 
     left, top, width, height = box

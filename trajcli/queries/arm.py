@@ -270,7 +270,6 @@ class LimitWatch:
     tool_off = 0.0
 
     def __init__(self, robot: Robot) -> None:
-        """Watch the position limits of a robot."""
         self.rows, self.outside = 0, 0
         self.first: JointOutsideLimits | None = None
         self.remark: str | None = None

@@ -67,7 +67,6 @@ def find_answers(
 
 
 def _named(configuration: Configuration | None) -> dict[str, str]:
-    """Return the choices that are named."""
     return {} if configuration is None else configuration.branch_names
 
 

@@ -137,7 +137,6 @@ def _end(fields: Mapping[str, Any], context: ReadingContext) -> PoseStep:
 
 
 def _typed(fields: Mapping[str, Any], context: ReadingContext) -> TypedAngles | None:
-    """Return the angles of fields that are a pose."""
     if "rpy" in fields:
         sequence, frame, given = "XYZ", "fixed", fields["rpy"]
     elif "euler" in fields:

@@ -121,11 +121,7 @@ def _arrays(blocks: Sequence[Array], columns: Sequence[Column]) -> dict[str, Arr
 
 
 def _dtype(columns: Sequence[Column]) -> np.dtype[Any]:
-    """Return the type of a row: a field for each group of columns, and for each signal, which has a name.
-
-    Raises:
-        TrajcliError: When the columns of a group do not stand together.
-    """
+    """Return the type of a row: a field for each group of columns, and for each signal, which has a name."""
     counts: dict[str, int] = {}
     last = ""
     for column in columns:

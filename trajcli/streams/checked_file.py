@@ -122,11 +122,7 @@ def _require_same(read: _Sum, written: _Sum) -> None:
 
 
 class _Comparison:
-    """A thread that compares texts with their rows and writes them to a file.
-
-    Attributes:
-        sum: Of all that was written so far.
-    """
+    """A thread that compares texts with their rows and writes them to a file; `sum` is of all of it."""
 
     def __init__(self, out: BinaryIO, verify: Verify) -> None:
         self.sum = _Sum()

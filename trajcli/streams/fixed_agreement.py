@@ -82,7 +82,6 @@ class FixedLayout:
         return self._decimals_agree(buffer) and self._whole_numbers_agree(buffer)
 
     def _decimals_agree(self, buffer: _Bytes) -> bool:
-        """Compare the columns with decimals."""
         part = slice(None) if self._fixed.all() else self._fixed
         windows = np.ndarray(buffer.size - _WINDOW + 1, np.complex128, buffer, strides=(1,))
         halves = windows[np.ascontiguousarray(self._ends[:, part])].view(np.uint64)  # front, back, front, ...
@@ -113,7 +112,6 @@ class FixedLayout:
         return words[part]
 
     def _whole_numbers_agree(self, buffer: _Bytes) -> bool:
-        """Compare the columns without decimals."""
         columns = np.flatnonzero(~self._fixed)
         ends = self._ends[:, columns] + (_WINDOW - 1)  # of the separators
         expected = np.where(columns == self._fixed.size - 1, ord("\n"), ord(","))

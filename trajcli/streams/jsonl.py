@@ -96,11 +96,7 @@ def _numbers(line: bytes, keys: Sequence[_Key], row: int) -> list[float]:
 
 
 def _keys(columns: Sequence[Column]) -> tuple[_Key, ...]:
-    """Return the keys of each object, in the order of the columns.
-
-    Raises:
-        TrajcliError: When the columns of a group do not stand together.
-    """
+    """Return the keys of each object, in the order of the columns."""
     keys: list[_Key] = []
     for index, column in enumerate(columns):
         group = column.kind if group_of(column) == SIGNALS else group_of(column)

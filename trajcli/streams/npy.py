@@ -212,11 +212,7 @@ def _rows_of(
 
 
 def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
-    """Return the arrays of real numbers in an archive, by their names.
-
-    Raises:
-        InputError: When it is none, or too large.
-    """
+    """Return the arrays of real numbers in an archive, by their names."""
     import zipfile
     import zlib
 

@@ -200,7 +200,6 @@ def _begins_as_mcap(path: str | Path) -> bool:
 
 
 def _message(source: ByteSource) -> ArrayRows:
-    """Return the motion in a message."""
     from trajcli.streams.ros_messages import read_ros_yaml
 
     message = read_ros_yaml(source)

@@ -104,7 +104,6 @@ def _text(source: ByteSource) -> str:
 
 
 def _document(text: str, file: str) -> Any:  # noqa: ANN401
-    """Return the content of a YAML document."""
     import yaml
 
     try:

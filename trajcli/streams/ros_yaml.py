@@ -102,7 +102,6 @@ def _head(joint_names: Sequence[str], message: RosMessage) -> Iterator[str]:
 
 
 def _points(knots: Knots, rows: slice, indent: str, orders: int) -> Iterator[str]:
-    """Yield a line for each point."""
     states = (knots.position[rows], knots.velocity[rows], knots.acceleration[rows])[:orders]
     for time, *values in zip(knots.nanoseconds[rows].tolist(), *states, strict=True):
         seconds, rest = divmod(time, _BILLION)

@@ -35,7 +35,6 @@ class ColumnExtents:
     """
 
     def __init__(self, width: int) -> None:
-        """Begin with no rows."""
         self.largest = np.zeros(width)
         self._low, self._high = np.full(width, np.inf), np.full(width, -np.inf)
 

@@ -189,11 +189,7 @@ def _open_special(path: str) -> BinaryIO | None:
 
 
 def _mode_of(target: Path) -> int | None:
-    """Return the permissions of an existing file, which must be writable; None where there is none.
-
-    Raises:
-        PermissionError: When the file may not be written.
-    """
+    """Return the permissions of an existing file, which must be writable; None where there is none."""
     try:
         mode = stat.S_IMODE(target.stat().st_mode)
     except FileNotFoundError:

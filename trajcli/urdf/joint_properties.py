@@ -112,7 +112,6 @@ def _position(
 def _softened(
     document: UrdfDocument, joint: JointElement, position: tuple[float, float], notes: list[str]
 ) -> tuple[float, float]:
-    """Return the range within the soft limits."""
     safety = joint.element.first("safety_controller")
     low, high = (document.number(safety, f"soft_{end}_limit") for end in ("lower", "upper"))
     if low is None and high is None:
@@ -170,7 +169,6 @@ def _acceleration(
 
 
 def _friction(document: UrdfDocument, joint: JointElement) -> Friction:
-    """Return Coulomb's friction and the damping."""
     element = joint.element.first("dynamics")
     values = []
     for name in ("friction", "damping"):

@@ -186,12 +186,7 @@ class _Tree:
         return starts
 
     def _behind(self, start: str, *, whole: bool) -> Iterator[tuple[str, int, int]]:
-        """Yield each link behind a link, how many joints that move lead to it, and how many fixed ones then.
-
-        Args:
-            start: The link, which is among them.
-            whole: Whether grippers belong to it.
-        """
+        """Yield each link behind a link, how many joints that move lead to it, and how many fixed ones."""
         links = [(start, 0, 0)]
         while links:
             link, moving, fixed = links.pop()

@@ -105,12 +105,7 @@ def _unfit(arm: Robot, rail: RailSpec) -> tuple[str, str] | None:
 
 
 def _slide(rail: RailSpec, *, efforts: bool) -> tuple[Joint, Limits]:
-    """Return the slide as a joint, with its limits.
-
-    Args:
-        rail: As the job gives it.
-        efforts: Whether those of the arm are in force without being asked for.
-    """
+    """Return the slide as a joint, with its limits."""
     link = None if rail.mass is None else LinkInertia(rail.mass, (0.0, 0.0, 0.0), (0.0,) * 6)
     joint = Joint(
         rail.name,

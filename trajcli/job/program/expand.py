@@ -164,14 +164,7 @@ class _Expansion:
         return list(self._entries(self._sequences[name], path, first, ""))
 
     def _count(self, listed: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
-        """Return how many entries a list of moves becomes; refuse what is wrong with its repeats and calls.
-
-        Args:
-            listed: The list.
-            path: Where it stands.
-            bound: ManyNames that are many, of which the rounds say which one is meant.
-            chain: Sequences that are being called.
-        """
+        """Return how many entries a list of moves becomes; refuse what is wrong with its repeats."""
         if not isinstance(listed.value, list):
             raise self._names.refused("expected a list of moves", path)
         if not listed.value:

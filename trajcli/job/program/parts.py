@@ -103,12 +103,7 @@ class Parts:
         return self._with_defaults(MovePart(_mapping(entry, move), places), fastest=True)
 
     def _with_defaults(self, part: MovePart, *, fastest: bool = False) -> MovePart:
-        """Return a part with the defaults of the job where it does not say otherwise.
-
-        Args:
-            part: The part.
-            fastest: Whether its law is time-optimal where nobody says which.
-        """
+        """Return a part with the defaults of the job where it does not say otherwise."""
         fields = fields_of(part.node)
         planner = fields["planner"].value if "planner" in fields else None
         if not isinstance(planner, str) or planner not in PLANNERS or not (self._defaults or fastest):

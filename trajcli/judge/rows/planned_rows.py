@@ -252,15 +252,7 @@ def _rates(plan: Plan, stamps: _Stamps) -> Iterator[float]:
 
 
 def _first_difference(rows: _Rows, plan: Plan, grid: Grid, halves: Array, stamps: _Stamps) -> str | None:
-    """Return where the first row differs from the plan on a grid that its stamps fit; None where none does.
-
-    Args:
-        rows: The file.
-        plan: Of the job.
-        grid: With as many rows.
-        halves: Half a unit of each column, SI, shape (m,).
-        stamps: Of the file.
-    """
+    """Return where the first row differs from the plan on a grid that its stamps fit; None where none."""
     robot, done = plan.loaded.robot_of_rows, 0
     wanted = sample(plan.trajectory, grid, rows.groups, robot=robot, size=_ROWS)
     for block, planned, (_, local) in zip(rows.blocks(), wanted, grid.blocks(_ROWS), strict=True):
@@ -279,14 +271,7 @@ def _first_difference(rows: _Rows, plan: Plan, grid: Grid, halves: Array, stamps
 
 
 def _beside(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str:
-    """Return what rows are whose stamps are none of the motion: a part of it, that backward, or others.
-
-    Args:
-        rows: The file.
-        plan: Of the job.
-        halves: Half a unit of each column, SI, shape (m,).
-        stamps: Of the file.
-    """
+    """Return what rows are whose stamps are none of the motion: a part of it, that backward, or others."""
     duration = plan.trajectory.duration
     if rows.kept is None or stamps.count < 2 or np.diff(rows.kept[:, rows.time]).min() <= 2 * _NANOSECOND:
         return _NO_GRID

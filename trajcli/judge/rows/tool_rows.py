@@ -42,13 +42,7 @@ Moves = NDArray[np.int64] | None
 
 @frozen
 class _ToolRows:
-    """Rows about the tool, of a whole file.
-
-    Attributes:
-        rows: The file.
-        columns: What each column is.
-        values: In their units, shape (N, m).
-    """
+    """Rows about the tool, of a whole file: what each column is, and values (N, m) in their units."""
 
     rows: RowSource
     columns: tuple[Column, ...]
@@ -168,11 +162,7 @@ def _of_poses(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array)
 
 
 def _with_first_tool(of_tool: _ToolRows, arms: ArmsOfMoves, moves: NDArray[np.int64]) -> Array:
-    """Return the rows of a file, (N, m), with the poses that the first tool has there.
-
-    Raises:
-        InputError: When the file says no orientation: then nothing is known of another tool.
-    """
+    """Return the rows of a file, (N, m), with the poses that the first tool has there."""
     if not of_tool.has("pose"):
         raise InputError(
             f"{of_tool.rows.named.file} has positions of several tools, and no orientation",
@@ -253,11 +243,7 @@ def _of_twists(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array
 
 
 def _along_paths(of_tool: _ToolRows, plan: Plan) -> _Found:
-    """Return the joints that follow the job's paths; in moves without a path those of the plan.
-
-    Raises:
-        InputError: When nothing says of which move a row is, or no joints are there.
-    """
+    """Return the joints that follow the job's paths; in moves without a path those of the plan."""
     from trajcli.kinematics.following.follower import LostError, follower
 
     t = of_tool.values[:, of_tool.index("t")]
@@ -290,13 +276,7 @@ def _along_paths(of_tool: _ToolRows, plan: Plan) -> _Found:
 
 
 def _in_plan(since: Array, owner: Array, plan: Plan) -> tuple[Array, Array]:
-    """Return for each row the time in the plan that has as much of its move done, and how much faster it is.
-
-    Args:
-        since: Times from the first row, s, shape (N,).
-        owner: Index of the move of each row, shape (N,).
-        plan: Of the job.
-    """
+    """Return for each row the time in the plan with as much of its move done, and how much faster it is."""
     duration = plan.trajectory.duration
     found, faster = np.clip(since, 0.0, duration), np.ones(since.size)
     if abs(since[-1] - duration) <= _SAME_DURATION:
@@ -312,11 +292,7 @@ def _in_plan(since: Array, owner: Array, plan: Plan) -> tuple[Array, Array]:
 
 
 def _moves_of(of_tool: _ToolRows, plan: Plan) -> Array:
-    """Return the index of the move of each row, (N,).
-
-    Raises:
-        InputError: When nothing says it.
-    """
+    """Return the index of the move of each row, (N,)."""
     at, trajectory = of_tool.index("move"), plan.trajectory
     if at is not None:
         return np.asarray(of_tool.values[:, at])

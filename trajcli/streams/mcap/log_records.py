@@ -245,11 +245,7 @@ class LogRecords:
         return block
 
     def _unpacked(self, chunk: Any) -> bytes:  # noqa: ANN401
-        """Return the records of a chunk.
-
-        Raises:
-            InputError: When its compression is unknown, it is too long, or its checksum is wrong.
-        """
+        """Return the records of a chunk."""
         if chunk.uncompressed_size > LONGEST_RECORD:
             raise self.wrong(f"a chunk claims {chunk.uncompressed_size} bytes, more than {LONGEST_RECORD}")
         data = self._decompressed(chunk)

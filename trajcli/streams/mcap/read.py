@@ -161,11 +161,7 @@ def _same_joints(parts: Iterable[JointSeries], file: str, topic: str) -> Iterato
 
 
 def _layouts(known: LogRecords, channel: int, field: str | None) -> Callable[[bytes], StateLayout] | None:
-    """Return where the parts of a channel's messages stand; None where each holds a trajectory.
-
-    Raises:
-        InputError: When the messages have several states and none is chosen, or have no such field.
-    """
+    """Return where the parts of a channel's messages stand; None where each holds a trajectory."""
     kind, topic = _type(known, channel), known.channels[channel].topic
     if kind != definitions.CONTROLLER_STATE:
         if field is not None:
@@ -196,11 +192,7 @@ def _channels(known: LogRecords, topic: str) -> set[int]:
 
 
 def _chosen(known: LogRecords, topic: str | None) -> str:
-    """Return the topic that is read.
-
-    Raises:
-        InputError: When there is none, or several.
-    """
+    """Return the topic that is read."""
     every = {channel.topic: number for number, channel in known.channels.items()}
     fit = [name for name, number in every.items() if _type(known, number) in _READ]
     if topic is None:
@@ -247,11 +239,7 @@ def _decoded(
 
 
 class _Clock:
-    """The start of the times of a log, which is found with the first stamp.
-
-    Attributes:
-        start: ns.
-    """
+    """The start of the times of a log, ns, which is found with the first stamp."""
 
     def __init__(self, own: Mapping[str, str]) -> None:
         self._epoch = own.get("epoch", "")

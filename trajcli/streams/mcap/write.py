@@ -192,7 +192,6 @@ class _Log:
 
 
 def _encoder(compression: Compression) -> Encoder:
-    """Return the function that compresses the messages of a chunk."""
     if compression == "zstd":
         import zstandard
 
