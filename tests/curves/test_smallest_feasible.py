@@ -63,3 +63,29 @@ def test_a_dip_that_stays_above_hides_none_behind_it(block: int) -> None:
         return np.minimum(0.05 + np.abs(np.log(x / 3.0)), outside((20.0, 20.0 * (1 + 1e-6)))(x))
 
     assert smallest_feasible(excess, 1.0, 100.0, block=block) == pytest.approx(20.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("edge", [1.7, 3.0, 9.99])
+def test_what_is_found_is_feasible_itself(edge: float) -> None:
+    """Not merely near: whoever asked for the least factor that keeps a limit uses it as it is."""
+    found = smallest_feasible(lambda x: edge - x, 1.0, 10.0)
+    assert found is not None
+    assert edge <= found <= edge * (1 + 2e-13)
+
+
+def test_an_excess_of_nothing_is_feasible() -> None:
+    assert smallest_feasible(lambda x: np.maximum(2.0 - x, 0.0), 1.0, 10.0) == pytest.approx(2.0, rel=1e-12)
+
+
+def test_the_first_of_several_valleys_counts() -> None:
+    """0.9 + cos(a) with a = 2 pi ln x / ln 1.2 is not above 0 from arccos(-0.9) on, and again 1.2 times further."""
+    found = smallest_feasible(lambda x: 0.9 + np.cos(2 * np.pi * np.log(x) / np.log(1.2)), 1.0, 10.0)
+    assert found == pytest.approx(1.2 ** (np.arccos(-0.9) / (2 * np.pi)), rel=1e-9)
+
+
+@pytest.mark.parametrize("bottoms", [(3.0, 7.0), (1.02, 2.0), (9.9,)])
+def test_of_narrow_dips_the_first_one_counts_and_one_at_the_end_is_seen(bottoms: tuple[float, ...]) -> None:
+    def excess(x: np.ndarray) -> np.ndarray:
+        return np.min([np.abs(x - bottom) - 1e-4 for bottom in bottoms], axis=0)
+
+    assert smallest_feasible(excess, 1.0, 10.0) == pytest.approx(bottoms[0] - 1e-4, rel=1e-9)

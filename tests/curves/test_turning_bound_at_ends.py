@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.turning_bound import turning_bound
+from trajcli.curves.turning_bound import bound_between_stops, turning_bound
 
 CLOSE = 1e-6
 
@@ -123,7 +123,13 @@ def test_an_end_where_it_could_not_stop_asks_for_the_way_at_full_speed(sign):
     path = through(0.0, 0.01 * sign)
     bounds = limits_of([-1.0, 1.0], [-4.0, 4.0], 20.0)
     assert turning_bound(path, bounds, (90.0, 0.0))[0] == pytest.approx(0.01, rel=1e-9)
+    assert turning_bound(path, bounds, (90.0, 0.0))[0] <= 0.01
     assert turning_bound(path, bounds, (0.0, 90.0))[0] == pytest.approx(0.01, rel=1e-9)
+
+
+def test_ends_over_the_limit_of_speed_may_keep_theirs():
+    bounds = limits_of([-1.0, 1.0], [-4.0, 4.0], 20.0)
+    assert turning_bound(through(0.0, 1.0), bounds, (1.5, 1.5))[0] == pytest.approx(1.0 / 1.5, rel=1e-9)
 
 
 def test_without_a_limit_of_speed_the_others_bound_it():
@@ -187,3 +193,88 @@ def test_a_piece_that_turns_twice_has_three_stretches():
     np.testing.assert_allclose(path.evaluate(np.array([0.0, 0.5, 1.5, 2.0]))[:, 0], [-1.0, 1.0, -1.0, 1.0])
     bounds = tuple(np.array([[-size, size]]) for size in (1e6, 1.0, 1e12))
     assert turning_bound(path, bounds, (0.0, 0.0))[0] == pytest.approx(3 * 2 * np.sqrt(2.0), rel=1e-5)
+
+
+def line_of(*points):
+    """Return straight lines of two joints, in unit intervals of s; the second one's limits are loose."""
+    corners = np.array(points)
+    path = PiecewisePolynomial(
+        np.arange(float(len(corners))), np.stack([np.diff(corners, axis=0), corners[:-1]])
+    )
+    bounds = [np.array([[-size, size], [-99.0, 99.0]]) for size in (1.0, 4.0, 50.0)]
+    return path, (bounds[0], bounds[1], bounds[2] * [[1.0], [99.0]])
+
+
+LIMITS = (1.0, 4.0, 4.0, 50.0)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_only_at_the_stops_where_a_path_goes_back_its_acceleration_is_free(order):
+    """Around a corner it is zero. One of two stops is a corner, the other one a way back."""
+    corners = [(0.0, 0.0), (0.3, -0.2), (1.0, 0.15), (0.3, -0.2)][::order]
+    path, bounds = line_of(*corners)
+    needed = fastest(0.3, (0.0, 0.0), LIMITS, (False, False))
+    needed += 2 * fastest(0.7, (0.0, 0.0), LIMITS, (False, True))
+    duration, _ = bound_between_stops(path, bounds, (0.0, 0.0), path.breaks[1:-1])
+    assert needed * (1 - CLOSE) <= duration <= needed * (1 + 1e-9)
+
+
+def test_a_path_that_goes_nearly_back_turns_a_corner():
+    path, bounds = line_of((0.0, 0.0), (0.7, 0.3), (0.0, 0.02))
+    needed = 2 * fastest(0.7, (0.0, 0.0), LIMITS, (False, False))
+    duration, _ = bound_between_stops(path, bounds, (0.0, 0.0), path.breaks[1:-1])
+    assert duration == pytest.approx(needed, rel=CLOSE)
+
+
+def test_a_path_goes_back_at_whatever_speed_s_has_there():
+    path, bounds = line_of((0.0, 0.0), (0.7, 0.35), (0.35, 0.175))
+    needed = fastest(0.7, (0.0, 0.0), LIMITS, (False, True)) + fastest(
+        0.35, (0.0, 0.0), LIMITS, (True, False)
+    )
+    duration, _ = bound_between_stops(path, bounds, (0.0, 0.0), path.breaks[1:-1])
+    assert needed * (1 - CLOSE) <= duration <= needed * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("speeds", [(0.6, 0.0), (0.0, 0.6), (0.6, 0.8)])
+def test_ends_of_a_path_with_stops_may_be_in_motion(speeds):
+    path, bounds = line_of((0.0, 0.0), (0.7, 0.1), (1.2, 0.4))
+    needed = fastest(0.7, (speeds[0], 0.0), LIMITS, (speeds[0] > 0, False))
+    needed += fastest(0.5, (0.0, speeds[1]), LIMITS, (False, speeds[1] > 0))
+    duration, _ = bound_between_stops(path, bounds, (speeds[0] / 0.7, speeds[1] / 0.5), path.breaks[1:-1])
+    assert needed * (1 - CLOSE) <= duration <= needed * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_stop_where_a_bent_piece_turns_back_is_no_end_of_a_line(sign):
+    """q = 4 s (1 - s) stands at s = 0.5 whatever sd is: its acceleration there may be anything."""
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), sign * np.array([[[-4.0]], [[4.0]], [[0.0]]]))
+    needed = 2 * fastest(1.0, (0.0, 0.0), (1.0, 4.0, 4.0, 20.0), (False, True))
+    bounds = limits_of([-1.0, 1.0], [-4.0, 4.0], 20.0)
+    duration, _ = bound_between_stops(path, bounds, (0.0, 0.0), np.array([0.5]))
+    assert duration == pytest.approx(needed, rel=CLOSE)
+
+
+def test_lines_that_follow_each_other_without_a_stop_are_no_single_line():
+    """A joint goes by 1, by 0.1 and, from a stop on, by 0.9, each while s goes by 1."""
+    limits = (1.0, 4.0, 4.0, 20.0)
+    needed = sum(fastest(way, (0.0, 0.0), limits, (False, False)) for way in (1.1, 0.9))
+    bounds = limits_of([-1.0, 1.0], [-4.0, 4.0], 20.0)
+    duration, _ = bound_between_stops(through(0.0, 1.0, 1.1, 2.0), bounds, (0.0, 0.0), np.array([2.0]))
+    assert duration == pytest.approx(needed, rel=CLOSE)
+
+
+@pytest.mark.parametrize("steps", [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)])
+def test_each_limit_of_a_line_is_that_of_the_joint_that_it_binds(steps):
+    """One joint binds its speed and its jerk, the other its acceleration, unlike forwards and backwards."""
+    forward, backward = np.array([[1.0, 9.0], [9.0, 4.0]]), np.array([[0.8, 7.0], [7.0, 3.0]])
+    velocity, acceleration = (np.stack([-low, up], axis=1) for low, up in zip(backward, forward, strict=True))
+    jerk = np.array([[-20.0, 20.0], [-99.0, 99.0]])
+    ways = np.array(steps)
+    path = PiecewisePolynomial(np.arange(3.0), np.stack([[ways, ways], [0.0 * ways, ways]]))
+    speed = 1.0 if steps[0] > 0 else 0.8
+    rates = (4.0, 3.0) if steps[1] > 0 else (3.0, 4.0)
+    needed = 2 * fastest(1.0, (0.0, 0.0), (speed, *rates, 20.0), (False, False))
+    duration, joint = bound_between_stops(path, (velocity, acceleration, jerk), (0.0, 0.0), np.array([1.0]))
+    assert joint is None
+    assert duration == pytest.approx(needed, rel=CLOSE)
+    assert turning_bound(path, (velocity, acceleration, jerk), (0.0, 0.0))[0] < 0.9 * needed

@@ -214,3 +214,16 @@ def test_rows_right_beside_a_corner_are_on_its_sides(corner: int, by: float) -> 
     assert [(each.row, each.value) for each in deviations(places, 4)] == [
         (row, pytest.approx(3e-5, rel=1e-6))
     ]
+
+
+@pytest.mark.parametrize("blocks", [1000, 40])
+@pytest.mark.parametrize("back", [5, 45])
+def test_a_tool_that_goes_back_on_its_line_is_on_it(back: int, blocks: int) -> None:
+    """By 5 mm a row, which is many of the places at which the path is looked at first; aside it is found there, too."""
+    forth = along(1)
+    places = np.concatenate([forth[:46], forth[45 - back : 45][::-1], forth[45 - back :]])
+    assert deviations(places, blocks=blocks) == []
+    places[48, 2] += 3e-5
+    assert [(each.row, each.value) for each in deviations(places, blocks=blocks)] == [
+        (49, pytest.approx(3e-5, rel=1e-6))
+    ]

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 
-from trajcli.geometry.power_series import growth
+from trajcli.geometry.power_series import growth, series_exponential, series_product
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.kinematics.tool_majorants import majorants
 
 ORDER, LENGTH = 11, 0.3
@@ -62,6 +63,33 @@ def test_growth_bounds_every_derivative_everywhere() -> None:
     rising, end = growth(same, np.array([LENGTH]), ORDER)[:, 0], shifted(same, LENGTH)
     np.testing.assert_allclose(rising[1:], end[1:], rtol=1e-12)
     np.testing.assert_allclose(rising[0], end[0] - shifted(same, 0.0)[0], rtol=1e-12)
+
+
+def test_products_and_exponentials_of_series_are_those_of_the_functions() -> None:
+    """Of several pieces at once, in some of which a power has no part; exp(f) is the product of exp(f_k r^k)."""
+    one, other = RNG.uniform(0.1, 2.0, (2, ORDER + 1, 4))
+    one[1, 0] = one[0, 1] = one[3:, 2] = other[2, 1] = other[0, 3] = 0.0
+    products = [np.convolve(f, g)[: ORDER + 1] for f, g in zip(one.T, other.T, strict=True)]
+    np.testing.assert_allclose(series_product(one, other), np.transpose(products), rtol=1e-12)
+    one[0] = 0.0
+    for f, found in zip(one.T, series_exponential(one).T, strict=True):
+        whole = np.eye(1, ORDER + 1)[0]
+        for k in range(1, ORDER + 1):
+            factor = np.zeros(ORDER + 1)
+            factor[::k] = [f[k] ** j / factorial(j) for j in range(ORDER // k + 1)]
+            whole = np.convolve(whole, factor)[: ORDER + 1]
+        np.testing.assert_allclose(found, whole, rtol=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_slide_is_as_long_a_lever_as_it_goes(sign: int) -> None:
+    """It turns by w t and slides from nothing by v t: at the end |p'|^2 = v^2 + (w v T)^2."""
+    joints = Joint("turn", alpha=-np.pi / 2), Joint("slide", "prismatic")
+    arm = Robot("turning slide", joints, unlimited(2), "standard", np.eye(4), np.eye(4))
+    v, w = 0.5 * sign, 40.0
+    rising = growth(np.array([[[w, v]], [[0.0, 0.0]]]), np.array([LENGTH]), ORDER)
+    position, _ = majorants(arm, np.zeros((1, 2)), rising)
+    assert 1.0 <= position[1, 0] / np.hypot(v, w * v * LENGTH) <= 1.2
 
 
 def test_a_planar_arm_is_a_sum_of_exponentials() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -94,6 +95,13 @@ def test_a_step_that_makes_it_worse_is_taken_back(start: float, monkeypatch: pyt
     assert fit.converged
 
 
+def test_a_step_to_where_nothing_is_defined_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From 3 Newton's step for log x = 0 leads to 3 - 3 log 3, below 0."""
+    fit = descended(monkeypatch, lambda x: np.log(x) if x > 0 else np.nan, lambda x: 1 / x, 3.0)
+    assert float(cast("Any", fit.robot)) == pytest.approx(1.0, abs=1e-9)
+    assert fit.converged
+
+
 @pytest.mark.parametrize("start", [-2.0, 0.5])
 def test_residuals_that_no_parameters_make_least_are_no_end(
     start: float, monkeypatch: pytest.MonkeyPatch
@@ -160,3 +168,20 @@ def test_the_scale_of_a_loss_is_that_of_the_residuals_it_ends_with(
     assert abs((weights * off).sum()) < 1e-5
     assert fit.outliers == tuple(np.flatnonzero(ratio > 3.0).tolist())
     assert fit.converged
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("unit", [1e-6, 1e4])
+def test_the_scale_of_a_loss_does_not_depend_on_the_unit(
+    unit: float, loss: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fit_module, "shifted", lambda x, _, step: x + float(step[0]))
+    numbers = np.append(np.random.default_rng(8).normal(size=40), [20.0, -9.0])
+    begun = Fit(cast("Any", 2.0), cast("Any", None), np.eye(1), 0, 0, np.ones(42), None, (), True)
+    one = fit_module._converged(Location(numbers, loss), begun)
+    other = fit_module._converged(
+        Location(unit * numbers, loss), replace(begun, robot=cast("Any", 2.0 * unit))
+    )
+    assert other.loss_scale == pytest.approx(unit * cast("float", one.loss_scale), rel=1e-6)
+    assert other.outliers == one.outliers
+    np.testing.assert_allclose(other.weights, one.weights, rtol=1e-5)
