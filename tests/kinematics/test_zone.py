@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oracle_robots import exponentials, random_arm, screws
@@ -95,6 +97,23 @@ def test_a_zone_of_several_measures_is_the_tightest_of_them():
     distance, angle = around.offsets(joints)
     most = np.max([distance, angle, np.abs(joints - corner).max(axis=1)], axis=0)
     np.testing.assert_allclose(around.shares(joints), most, rtol=1e-12)
+
+
+@pytest.mark.parametrize("measure", ["position", "orientation", "joints"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_zone_holds_what_no_measure_leaves_by_more_than_is_conceded(measure: str, sign: float):
+    """One measure is at its end, the others are wide: half a concession further it holds, two further it does not."""
+    robot, corner = random_arm(np.random.default_rng(5), 3, "standard"), np.array([0.3, -0.4, 0.9])
+    joints = corner + sign * np.array([[0.02, 0.01, 0.03]])
+    wide = ZoneAround(robot, corner, Zone(position=9.0, orientation=3.0, joints=(1.0, 1.0, 1.0)))
+    (distance,), (angle,) = wide.offsets(joints)
+    sizes = {"position": distance, "orientation": angle, "joints": np.abs(joints - corner)[0]}
+    more = np.array([1e-4, 0.0] if measure == "position" else [0.0, 1e-4])
+    for further, held in ((0.5, True), (2.0, False)):
+        size = sizes[measure] - further * more.max()
+        tight = {measure: tuple(size) if measure == "joints" else float(size)}
+        around = replace(wide, zone=replace(wide.zone, **tight))
+        assert around.holds(joints, more[None]) == [held]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from trajcli.judge.consumer import ConsumerJudge
     from trajcli.judge.recorded_tool import ToolJudge
     from trajcli.judge.rows.planned_rows import RowComparison
-    from trajcli.kinematics.following.motion import ToolMotion
     from trajcli.planning.plan import Plan
 
 Delivered = Callable[["LoadedJob", str | None, str], "Plan"]
@@ -454,13 +453,12 @@ def _tolerances(word: str | None, robot: Robot, units: Units) -> list[float]:
 def _tool_of(given: _Given) -> Callable[[], ToolJudge] | None:
     if given.robot.convention is None:
         return None
-    from trajcli.judge.recorded_tool import ToolJudge
+    from trajcli.judge.recorded_tool import ToolJudge, judge_of_moves
 
-    paths: Mapping[int, ToolMotion | None] | None = None
+    if given.loaded is None:
+        return lambda: ToolJudge(given.robot)
     moves = () if given.plan is None else given.plan.moves
-    if given.loaded is not None:
-        paths = {move.index: move.planned.tool for move in moves}
-    return lambda: ToolJudge(given.robot, paths, {move.index: move.robot for move in moves})
+    return lambda: judge_of_moves(given.robot, moves)
 
 
 def _consumer_of(profile: str | None, given: _Given) -> Callable[[], ConsumerJudge] | None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ from trajcli.limits.tolerances import TOOL_RELATIVE
 from trajcli.limits.tool import limits_tool, tool_excess, tool_peaks
 from trajcli.limits.tool_bound import ToolPeak
 
+if TYPE_CHECKING:
+    from trajcli.planners.planner import PlannedMove
+
 _PIECES = 2048  # at a time: nine configurations of each are looked at
 _TURN = 0.05  # rad or m that a joint moves between the rows at which nearness to a singularity is looked at
 _NEAR_SINGULAR = (
@@ -32,6 +36,13 @@ _TWICE = 2.0  # times a limit: no interpolation of dense rows that keep it goes 
 _CLOSE = 1e-6  # relative: what the slack of checks leaves of a chord
 _SAME_STEP = 4.0  # times the steps beside it: more is a jump of the tool
 _STEP = 1e-6  # m or rad: a step of the tool that is none
+
+
+def judge_of_moves(robot: Robot, moves: Sequence[PlannedMove]) -> ToolJudge:
+    """Return what judges the tool of an arm in moves of a job, each along its path outside of zones."""
+    from trajcli.planning.planned_move import path_of_tool
+
+    return ToolJudge(robot, {move.index: path_of_tool(move) for move in moves}, moves)
 
 
 class ToolJudge:
@@ -45,14 +56,14 @@ class ToolJudge:
         self,
         robot: Robot,
         paths: Mapping[int, ToolMotion | None] | None = None,
-        arms: Mapping[int, Robot] | None = None,
+        moves: Iterable[PlannedMove] = (),
     ) -> None:
         """Begin with no rows.
 
         Args:
             robot: An arm with geometry.
             paths: By move, where its tool shall go; None for a move in joint space. None without a job.
-            arms: By move, the arm with the tool that is then on its flange; the first one where left out.
+            moves: With the tools that are then on the flange, and zones; the first tool where left out.
         """
         self._robot, self._paths = robot, paths
         self._length = characteristic_length(robot)
@@ -60,12 +71,13 @@ class ToolJudge:
         self._worst = Collector()
         self._moved, self._seen = 0.0, -1
         self.notes: list[str] = []
+        known = {move.index: move for move in moves}
         for move, motion in (paths or {}).items():
             if motion is not None and (motion.path is None or motion.overlaps):
                 self.notes.append(f"move {move}: its segments overlap, the distance from them is not judged")
             elif motion is not None:
-                arm = robot if arms is None else arms[move]
-                self._recorded[move] = RecordedPath(arm, motion, move, self._worst)
+                arm, parts = (known[move].robot, known[move].planned.parts) if move in known else (robot, ())
+                self._recorded[move] = RecordedPath(arm, motion, move, self._worst, parts)
 
     def see(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from trajcli.kinematics.inverse.target import determinants, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.tolerances import exceeds
+from trajcli.trajectory import MoveInterval
 
 _SAMPLES = 1000  # of a path, where the nearest point is looked for first
 _STEPS = 8  # of Gauss and Newton from there
@@ -31,7 +33,14 @@ _FURTHER = 2.0  # times the way of the tool from row to row: how far along the p
 class RecordedPath:
     """The tool of one move beside the path on which it shall be."""
 
-    def __init__(self, robot: Robot, motion: ToolMotion, move: int, worst: Collector) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        motion: ToolMotion,
+        move: int,
+        worst: Collector,
+        parts: Sequence[MoveInterval] = (),
+    ) -> None:
         """Begin with no rows.
 
         Args:
@@ -39,6 +48,7 @@ class RecordedPath:
             motion: Where its tool shall go; with a path.
             move: Index of the move.
             worst: What is added to.
+            parts: Of a move that flies by a corner: in a zone its tool is on no path.
         """
         assert motion.path is not None  # noqa: S101
         self._robot, self._motion, self._move, self._worst = robot, motion, move, worst
@@ -53,6 +63,12 @@ class RecordedPath:
         self._limits = np.array([motion.tolerance.position, motion.tolerance.angle])
         self._fast = float(peaks(motion.law, (1,))[0].magnitude[0])
         self._before: tuple[float, Array, float] | None = None  # place, coordinates and time of a row
+        self._begins = next((part.start for part in parts if part.tool is motion), 0.0)
+        self._ends = parts[-1].end if parts else motion.law.end
+        borders = motion.law.evaluate(np.array([motion.law.start, motion.law.end]))[:, 0]
+        self._zones = [  # with the place of the path on its border
+            (part.around, float(borders[int(part.start > self._begins)])) for part in parts if part.around
+        ]
 
     def see(self, window: Intervals, pieces: slice, *, asked: bool) -> None:
         """Judge the rows of some pieces, and the middle between them.
@@ -85,14 +101,14 @@ class RecordedPath:
         """
         law = self._motion.law
         own = np.flatnonzero(
-            since + window.lengths[pieces] <= law.end + _LATE
+            since + window.lengths[pieces] <= self._ends + _LATE
         )  # of others the next move has part
         chosen = pieces.start + own
         if not chosen.size:
             return
         half = 0.5 * window.lengths[chosen]
         middle = horner(window.coefficients[:, chosen], half[:, None])
-        along = law.evaluate(np.clip(since[own], law.start, law.end))[:, 0]
+        along = law.evaluate(np.clip(since[own] - self._begins, law.start, law.end))[:, 0]
         slack = self._slack_of(middle, window)
         self._judge(middle, window.t[chosen] + half, window.rows[chosen], slack, (along, half))
 
@@ -112,12 +128,32 @@ class RecordedPath:
         warned: bool = False,
     ) -> Array:
         """Judge rows, or what lies behind rows of known s by some seconds; return their s (N,)."""
+        s, on_path = np.empty(len(q)), np.ones(len(q), dtype=bool)
+        for around, border in self._zones:
+            within = around.holds(q, slack[:, None] + self._limits)
+            s[within], on_path[within] = border, False
+        rows = np.flatnonzero(on_path)
+        if rows.size:
+            near = None if before is None else (before[0][rows], before[1][rows])
+            s[rows] = self._judge_on_path(q[rows], (t[rows], numbers[rows], slack[rows]), near, warned=warned)
+        return s
+
+    def _judge_on_path(
+        self,
+        q: Array,
+        rows: tuple[Array, NDArray[np.int64], Array],
+        before: tuple[Array, Array] | None,
+        *,
+        warned: bool,
+    ) -> Array:
+        """Judge rows outside of zones, with their times, numbers and slacks; return their s (N,)."""
+        t, numbers, _ = rows
         poses, jacobians = linearisation(self._robot, q)
         s = self._nearest(poses, t, before)
         sizes, limits = self._sizes(s, poses), self._limits
         self._across_corners(s, sizes, poses)
         for quantity, size, limit in zip(("position", "orientation"), sizes.T, limits, strict=True):
-            self._add(quantity, size, limit, (t, numbers, slack), warned=warned)
+            self._add(quantity, size, limit, rows, warned=warned)
         target = self._path.at_s(s, "right").target()
         of_rows = determinants(target, poses, jacobians, self._arm)
         if of_rows is not None:

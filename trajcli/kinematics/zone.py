@@ -102,6 +102,18 @@ class ZoneAround:
             used.append((np.abs(joints - self.corner) / np.array(self.zone.joints)).max(axis=1))
         return np.asarray(np.max(used, axis=0))
 
+    def holds(self, joints: Array, further: Array) -> NDArray[np.bool_]:
+        """Return which joint values (N, n) are off the zone by no more than `further` (N, 2), m and rad."""
+        off = []
+        if self.zone.needs_geometry:
+            parts = zip(
+                self.offsets(joints), (self.zone.position, self.zone.orientation), further.T, strict=True
+            )
+            off += [values - size - more for values, size, more in parts if size is not None]
+        if self.zone.joints is not None:
+            off += [*(np.abs(joints - self.corner) - self.zone.joints - further[:, 1:]).T]
+        return np.asarray(np.max(off, axis=0) <= 0.0)
+
     def largest_share(self, curve: PiecewisePolynomial, enough: float = 1.0) -> tuple[float, float]:
         """Return how much of the zone a curve q(t) uses for all t, and when it is most.
 

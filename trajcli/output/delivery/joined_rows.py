@@ -26,6 +26,7 @@ from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.tolerances import JOINED_RELATIVE
 from trajcli.planning.plan import Plan
+from trajcli.planning.planned_move import path_of_tool
 from trajcli.samples import sample
 
 if TYPE_CHECKING:
@@ -428,11 +429,10 @@ def _shares(
 
 def _tool_of(plan: Plan) -> ToolJudge | None:
     """Return the judge of the limits of the tool, and of its paths, where there are any."""
-    paths = {move.index: move.planned.tool for move in plan.moves}
     robots = {id(move.robot): move.robot for move in plan.moves}.values()
     limited = any(robot.limits.tcp != ToolLimits() for robot in robots)
-    if not limited and all(path is None for path in paths.values()):
+    if not limited and not any(map(path_of_tool, plan.moves)):
         return None
-    from trajcli.judge.recorded_tool import ToolJudge
+    from trajcli.judge.recorded_tool import judge_of_moves
 
-    return ToolJudge(plan.loaded.robot, paths, {move.index: move.robot for move in plan.moves})
+    return judge_of_moves(plan.loaded.robot, plan.moves)
