@@ -16,7 +16,7 @@ from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import flown_parts
-from trajcli.planners.flying_by.motion_search import with_paces
+from trajcli.planners.flying_by.motion_search import POWERS, with_shares
 from trajcli.planners.flying_by.row import row_of
 from trajcli.planners.flying_by.search import begin_search
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
@@ -50,7 +50,7 @@ def chain_with(moves: str) -> tuple[FlyByChain, float]:
 def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace):
     """Even at a lower pace in its zone than elsewhere its motion is one: then it takes that much longer."""
     chain, stopping = chain_with(moves)
-    chain = with_paces(chain, [pace])
+    chain = with_shares(chain, pace ** POWERS[None])
     laws = StoppingLaws()
     assert laws.slow_all(chain)
     assert not laws.slow_all(chain)

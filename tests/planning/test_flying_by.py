@@ -113,18 +113,44 @@ def test_a_corner_of_two_lines_of_the_tool_is_flown_by(zone, most):
     assert plan.flyby.stopping == pytest.approx(1.6139, abs=1e-3)
 
 
-def test_a_zone_that_is_lowered_is_flown_at_the_pace_that_is_said_and_its_bound_is_not_lowered():
-    """At a pace f one of velocity, acceleration and jerk of a joint reaches f, f^2 or f^3 of its limit in the zone."""
-    plan = flown(limits={**FAST, "tcp": {"acceleration": 3}})
+@pytest.mark.parametrize("order", few([3, 2, 1], 1))
+def test_a_zone_that_is_lowered_uses_the_parts_of_limits_that_are_said_and_its_bound_is_not_lowered(order):
+    """A limit of the tool takes of the derivative of joints that it is about, and what it leaves of it is used."""
+    limit = {1: {"speed": 0.3}, 2: {"acceleration": 3}, 3: {"jerk": 15}}[order]
+    bounds = {**FAST, "acceleration": 40, "jerk": 600} if order == 1 else FAST
+    plan = flown(limits={**bounds, "tcp": limit}, zone=0.1 if order == 1 else 0.02)
     assert plan.flyby is not None
     (zone,) = plan.flyby.zones
     times = np.linspace(zone.entered, zone.left, 4001)[1:-1]
     rates = plan.trajectory.curve.evaluate_orders(times, (1, 2, 3))
-    most = np.abs(rates).max(axis=(0, 2)) / [FAST["velocity"], FAST["acceleration"], FAST["jerk"]]
-    used = max(share ** (1 / order) for order, share in enumerate(most, start=1))
-    assert zone.tempo < 0.99
-    assert used == pytest.approx(zone.tempo, rel=1e-3)
+    most = np.abs(rates).max(axis=(0, 2)) / [*bounds.values()]
+    assert zone.shares[order - 1] < 0.99
+    assert most[order - 1] == pytest.approx(zone.shares[order - 1], rel=1e-3)
     assert plan.flyby.searched < plan.flyby.duration * (1 - 1e-3)
+
+
+@pytest.mark.full
+def test_limits_of_the_tool_leave_lines_a_gain():
+    """With joints held to what no tool of a plane exceeds, which is slower along lines, there is one, too."""
+    corners = [(0.4, 0.2, 0.3), (0.4, 0.4, 0.3), (0.1, 0.4, 0.3)]
+    lines = [{"planner": "line", "to": {"xyz": list(at)}, "law": {"shape": "time_optimal"}} for at in corners]
+    slides = [
+        {"type": "prismatic", "alpha": -np.pi / 2},
+        {"type": "prismatic", "theta": -np.pi / 2, "alpha": -np.pi / 2},
+        {"type": "prismatic"},
+    ]
+    gantry = {"convention": "standard", "joints": slides}
+    held = {"velocity": 1, "acceleration": 2 / np.sqrt(2), "jerk": 20 / np.sqrt(2)}
+    limits = {"speed": 0.5, "acceleration": 2, "jerk": 20}
+    lasts = [
+        flown(
+            *lines, robot=gantry, limits={**bounds, "tcp": limits}, zone=0.05, start={"xyz": [0.1, 0.2, 0.3]}
+        ).trajectory.duration
+        for bounds in ({"velocity": 1, "acceleration": 5, "jerk": 50}, held)
+    ]
+    stopping = 2 * (0.3 / 0.5 + 0.5 / 2 + 2 / 20) + (0.2 / 0.5 + 0.5 / 2 + 2 / 20)  # of seven phases each
+    assert lasts[0] < lasts[1] < stopping
+    assert lasts[0] < 0.85 * stopping
 
 
 @pytest.mark.full

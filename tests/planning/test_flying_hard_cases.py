@@ -80,7 +80,7 @@ def test_a_limit_that_binds_in_a_zone_alone_lowers_the_pace_of_the_zone_alone():
     assert largest(free)[0] > 10
     assert largest(free)[1] < 8 * (1 + 1e-9)
     assert 8.5 < largest(held)[0] < 9 * (1 + 1e-9)
-    assert held.flyby.zones[0].tempo < 1
+    assert held.flyby.zones[0].pace < 1
     assert free.flyby.duration < held.flyby.duration < held.flyby.stopping
 
 
@@ -130,7 +130,7 @@ def test_a_joint_that_slows_down_as_it_leaves_a_zone_came_no_faster_than_its_lim
     plan = lifting(100)
     times = np.linspace(0, plan.trajectory.duration, 20001)
     assert np.abs(plan.trajectory.curve.evaluate(times, 1)).max() <= 1 + 1e-9
-    assert plan.flyby.zones[0].tempo == 1
+    assert plan.flyby.zones[0].pace == 1
     assert not [event for event in plan.events if event.kind in {"not_faster", "lowered"}]
 
 

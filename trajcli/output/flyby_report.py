@@ -38,6 +38,6 @@ def _zone(zone: FlownZone, types: Sequence[JointType], names: Sequence[str]) -> 
             **{key: getattr(zone, key) for key in ZoneReport.model_fields if hasattr(zone, key)},
             "joint": None if zone.joint is None else names[zone.joint],
             "unit": unit,
-            "lowered": zone.tempo if zone.tempo < 1 else None,
+            "lowered": zone.pace if zone.pace < 1 else None,
         }
     )

@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.third_order.jerk import LawJerkConstraint
 from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
@@ -92,6 +93,11 @@ class Course(ABC):
     def limits_along(self) -> tuple[float, float, float] | None:
         """Limits of sd, sdd and -sdd by those of the tool, where s is the length of its path; else None."""
         return None
+
+    @property
+    def law_jerk(self) -> tuple[LawJerkConstraint, ...]:
+        """The limit of sddd by that of the jerk of the tool, where s is the length of its path."""
+        return ()
 
     @abstractmethod
     def tool_rates(self, s: Array) -> Array:

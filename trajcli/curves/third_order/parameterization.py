@@ -225,7 +225,8 @@ class _Search:
                 break
             stubborn = ((self.excess > _STUBBORN) & (self.lowered > _STUBBORN)).any(axis=0)
             if stubborn.any() and self.law.lengths.size + stubborn.sum() <= most:
-                self.lowered[:, stubborn] = 1.0
+                if self.rests:
+                    self.lowered[:, stubborn] = 1.0
                 self._cut(np.where(stubborn, 2, 1))
             self.lowered = self.lowered * (1.0 + lowered * np.maximum(self.excess - 1.0, 0.0))
             self._step(_LAST_GAP)

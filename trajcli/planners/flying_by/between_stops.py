@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, ToolLimits
 from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.course import Course
 
@@ -32,14 +33,29 @@ class CornerZone:
         left: The s of the course before at which its path enters the zone.
         joined: The s of the course behind at which its path leaves it.
         robot: With the limits in force inside.
-        tempo: What part of the speeds that limits allow are used inside: accelerations its square.
+        shares: What parts of the limits of joints are used inside, of velocity, acceleration and jerk.
     """
 
     around: ZoneAround
     left: float
     joined: float
     robot: Robot
-    tempo: float = 1.0
+    shares: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+    @property
+    def pace(self) -> float:
+        """How much slower a motion at full limits has to be to use no more of any than these parts."""
+        velocity, acceleration, jerk = self.shares
+        return min(velocity, math.sqrt(acceleration), math.cbrt(jerk))
+
+    @property
+    def limits(self) -> Limits:
+        """Limits with these parts of those of the joints."""
+        limits = self.robot.limits
+        velocity, acceleration, jerk = (
+            share * limits.of_order(order) for order, share in enumerate(self.shares, 1)
+        )
+        return replace(limits, velocity=velocity, acceleration=acceleration, jerk=jerk)
 
 
 @frozen
@@ -50,7 +66,7 @@ class FlyByChain:
         courses: At least two.
         corners: Between them.
         ends: sd and sdd at the start and at the end, each (2,).
-        tempos: Of each course, as that of a corner.
+        tempos: What part of the speeds that limits allow is used on each course: of accelerations its square.
     """
 
     courses: tuple[Course, ...]

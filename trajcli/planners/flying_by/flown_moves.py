@@ -53,7 +53,8 @@ class FlownZone:
         deviation: Largest distance of the tool from the programmed path, m; None likewise.
         turn: Largest angle of the tool from how it stands in the corner, rad; None likewise.
         binds: Which limit is used most in it.
-        tempo: What part of the speeds that limits allow it uses: below 1 where it was lowered.
+        shares: What parts of velocity, acceleration and jerk of the joints it may use: below 1 where lowered.
+        pace: How much slower than what its joints allow a motion with no more than these parts is.
         programmed: Joints along the programmed path from its border to the corner, and from there to the
             other border, shape (m, n).
     """
@@ -72,7 +73,8 @@ class FlownZone:
     deviation: float | None
     turn: float | None
     binds: str
-    tempo: float
+    shares: tuple[float, float, float]
+    pace: float
     programmed: Array
 
     def shifted(self, time: float, number: int) -> FlownZone:
@@ -131,7 +133,8 @@ def _flown_zone(chain: FlownChain, k: int, part: FlownPart, begun: float) -> Flo
         deviation=tool[2],
         turn=tool[3],
         binds=_binds(robot, curve),
-        tempo=corner.tempo,
+        shares=corner.shares,
+        pace=corner.pace,
         programmed=programmed[:: _SAMPLES // _KEPT],
     )
 
@@ -311,8 +314,8 @@ def zone_events(zones: Sequence[FlownZone], names: Sequence[str]) -> Iterator[Ev
                 "asked": Amount(zone.asked, 0, zone.joint, dimension),
             }
             yield Event("shrunk", message, zone.move, amounts)
-        if zone.tempo < 1:
-            text = (
-                f"the zone at its end is flown through at {zone.tempo:.6g} of the pace that its joints allow"
-            )
+        parts = zip(QUANTITIES[1:], zone.shares, strict=False)
+        lowered = " and ".join(f"{share:.6g} of the {name}" for name, share in parts if share < 1)
+        if lowered:
+            text = f"the zone at its end is flown through with at most {lowered} that its joints allow"
             yield Event("lowered", f"{text}: other limits ask for it", zone.move)

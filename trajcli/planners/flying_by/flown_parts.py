@@ -97,7 +97,7 @@ def flown_parts(
             for part, side in ((before, 1), (behind, 0))
         ]
         names = corner.robot.joint_names
-        parts += [_through(borders, joint_bounds(corner.robot.limits, corner.tempo), names), behind]
+        parts += [_through(borders, joint_bounds(corner.limits), names), behind]
     return parts
 
 
@@ -116,7 +116,7 @@ def along_course(
         index: Its number, for errors.
         stretch: From which s to which.
         states: There, (2, 2).
-        tempo: As that of a corner.
+        tempo: As of a chain.
         part: With the bounds of the law of a straight line in joint space; None for those at that pace.
 
     Raises:
@@ -164,10 +164,17 @@ def along_path(course: Course, stretch: tuple[float, float], states: Array, temp
     (v0, a0), (v1, a1) = (states / [tempo, tempo**2]).tolist()
     further, bounds = course.constraints(path), (limits.velocity, limits.acceleration)
     moving = np.abs(path.piece_ends(1)).max(axis=(0, 1)) > 0
-    if np.isfinite(limits.jerk[moving]).any():
+    if course.law_jerk or np.isfinite(limits.jerk[moving]).any():
         ends = {"start": (v0, a0), "end": (v1, a1)}
         solved: TimeOptimalMotion = jerk_limited_time_optimal(
-            path, *bounds, limits.jerk, **ends, further=further, hopeless=_HOPELESS, slower=_SLOWER
+            path,
+            *bounds,
+            limits.jerk,
+            **ends,
+            further=further,
+            further_jerk=course.law_jerk,
+            hopeless=_HOPELESS,
+            slower=_SLOWER,
         )
     else:
         solved = time_optimal(path, *bounds, start_velocity=v0, end_velocity=v1, further=further)
@@ -281,9 +288,7 @@ def zone_motions(chain: FlyByChain, states: Array) -> list[FlownPart]:
             position, first, second = course.curve.evaluate_orders(np.array([s]), (0, 1, 2))[0]
             rates = joint_rates(state[None], np.stack([first, second]))[0]
             borders.append(np.column_stack([position, rates]))
-        parts.append(
-            _through(borders, joint_bounds(corner.robot.limits, corner.tempo), corner.robot.joint_names)
-        )
+        parts.append(_through(borders, joint_bounds(corner.limits), corner.robot.joint_names))
     return parts
 
 

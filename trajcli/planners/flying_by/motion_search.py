@@ -18,6 +18,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
+from trajcli.limits.kinds import TOOL_KINDS
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import (
@@ -41,6 +42,8 @@ _TRIES, _FASTER, _STEEPER = 6, 1.01, 1.06  # bolder states: times their speeds, 
 _ENOUGH = 1e-4  # relative: a gain that is worth another law
 _CAREFUL = 0.97  # of the pace of a law from rest to rest: a state that is too fast costs a law in vain
 _BASIN = 0.02  # size of grids at which the better of two searches is known
+POWERS = np.arange(1, 4)  # of a pace, in velocities, accelerations and jerks
+_ORDERS = {kind.name: kind.order for kind in TOOL_KINDS}
 _ALIKE = 0.03  # relative: a pace that changes by less is known
 
 
@@ -67,9 +70,17 @@ class MotionSearch:
     Attributes:
         chain: That of the last motion, its zones lowered to the pace that limits allow.
         model: Duration of the fastest that was found, before the pace of any zone was lowered, s.
+        lowered: Whether a derivative of the joints was lowered in a zone for a limit of the tool.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, by_order: bool) -> None:
+        """Begin.
+
+        Args:
+            by_order: Whether limits of the tool lower in zones the derivative of the joints that they are
+                about, else the pace.
+        """
+        self.lowered, self._by_order = False, by_order
         self.chain: FlyByChain
         self.model = math.inf
         self._paces: dict[int, float] = {}
@@ -124,6 +135,11 @@ class MotionSearch:
             else:
                 self._paces.pop(id(course), None)  # the pace of the law that stops
                 self._laws.slow(self.chain, index, s, states)
+
+    @property
+    def shares(self) -> Array:
+        """The parts of the limits of joints that zones use, (k, 3)."""
+        return np.array([corner.shares for corner in self.chain.corners]).reshape(-1, 3)
 
     @property
     def exact(self) -> bool:
@@ -188,16 +204,24 @@ class MotionSearch:
         """Lower the pace of zones that are over a limit; return whether there was any."""
         if not self.chain.corners:
             return False
-        factors = [
-            max((finding.factor or 1.0 for finding in findings), default=1.0)
-            for findings in self._over(states)
-        ]
-        if max(factors) <= 1.0:
-            return False
-        slower = [1.0 if factor <= 1.0 else 1 / (factor * (1 + _MORE)) for factor in factors]
-        tempos = np.array([corner.tempo for corner in self.chain.corners])
-        self.chain = with_paces(self.chain, tempos * slower)
-        return True
+        shares = self.shares
+        lowered = shares * [self._kept_shares(findings) for findings in self._over(states)]
+        self.chain = with_shares(self.chain, lowered)
+        return bool((lowered < shares).any())
+
+    def _kept_shares(self, findings: Sequence[Finding]) -> Array:
+        """Return by what to lower velocity, acceleration and jerk of the joints, (3,), to keep limits.
+
+        A speed of the tool goes with those of the joints, its acceleration and jerk nearly so.
+        """
+        shares = np.ones(3)
+        for finding in findings:
+            order = _ORDERS.get(finding.kind) if self._by_order else None
+            powers = POWERS if order is None else np.where(order == POWERS, POWERS, 0)
+            if (finding.factor or 1.0) > 1.0:
+                shares = np.minimum(shares, ((finding.factor or 1.0) * (1 + _MORE)) ** -powers)
+                self.lowered |= order is not None
+        return shares
 
     def _over(self, states: Array) -> list[list[Finding]]:
         """Return what is wrong with the motion through each zone."""
@@ -219,10 +243,10 @@ class MotionSearch:
         return self._paces[id(course)]
 
 
-def with_paces(chain: FlyByChain, paces: Sequence[float] | Array) -> FlyByChain:
-    """Return a chain whose zones are flown through at other paces."""
-    corners = zip(chain.corners, map(float, paces), strict=True)
-    return replace(chain, corners=tuple(replace(corner, tempo=pace) for corner, pace in corners))
+def with_shares(chain: FlyByChain, shares: Array) -> FlyByChain:
+    """Return a chain whose zones use other parts of the limits of joints, (k, 3)."""
+    corners = zip(chain.corners, shares.tolist(), strict=True)
+    return replace(chain, corners=tuple(replace(corner, shares=tuple(each)) for corner, each in corners))
 
 
 def duration_of(parts: Sequence[FlownPart]) -> float:

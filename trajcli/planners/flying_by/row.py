@@ -93,10 +93,10 @@ def slowed(bounds: Array, tempo: float) -> Array:
     return np.asarray(bounds * np.repeat([tempo, tempo**2, tempo**3], 2))
 
 
-def joint_bounds(limits: Limits, tempo: float) -> Array:
-    """Return the bounds of the joints at a slower pace, (n, 6)."""
+def joint_bounds(limits: Limits) -> Array:
+    """Return the bounds of the joints, (n, 6)."""
     jerk = np.abs(limits.jerk).min(axis=1)[:, None]
-    return slowed(np.concatenate([limits.velocity, limits.acceleration, -jerk, jerk], axis=1), tempo)
+    return np.concatenate([limits.velocity, limits.acceleration, -jerk, jerk], axis=1)
 
 
 def _border(chain: FlyByChain, number: int, course: Course, eased: float, *, leads: bool) -> BorderNode:
@@ -104,13 +104,11 @@ def _border(chain: FlyByChain, number: int, course: Course, eased: float, *, lea
     corner = chain.corners[number]
     s, tempo = (corner.left, chain.tempos[number]) if leads else (corner.joined, chain.tempos[number + 1])
     tempo *= eased
-    rates, limits = course.rates(np.array([s])), corner.robot.limits
+    rates, limits = course.rates(np.array([s])), corner.limits
 
     def bounds(states: Array) -> Array:
         on_path = slowed(course.bounds(rates, states / [tempo, tempo**2]), tempo)
-        pace = corner.tempo
-        inside = slowed(law_bounds(rates, limits, limits.tcp, states / [pace, pace**2]), pace)
-        return _tighter(on_path, inside)
+        return _tighter(on_path, law_bounds(rates, limits, limits.tcp, states))
 
     return BorderNode(_same_everywhere(bounds) if course.uniform else bounds, leads=leads, goes_on=not leads)
 
@@ -131,7 +129,7 @@ def _zone_part(corner: CornerZone, before: Course, behind: Course) -> ZonePart:
         np.stack([course.curve.evaluate(s, order) for order in (1, 2)])
         for course, s in ((before, corner.left), (behind, corner.joined))
     ]
-    return ZonePart(joint_bounds(corner.robot.limits, corner.tempo), last - first, rates[0], rates[1])
+    return ZonePart(joint_bounds(corner.limits), last - first, rates[0], rates[1])
 
 
 def _tighter(one: Array, other: Array) -> Array:

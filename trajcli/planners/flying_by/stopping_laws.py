@@ -129,7 +129,7 @@ class StoppingLaws:
 
     def _pace(self, chain: FlyByChain, index: int) -> float:
         """Return the pace of a course at which the states at its borders are possible in the zones, too."""
-        zones = [chain.corners[border // 2].tempo for border in self._borders(chain, index)]
+        zones = [chain.corners[border // 2].pace for border in self._borders(chain, index)]
         return min(chain.tempos[index], *zones) * (1 - _APART * (index % 2))
 
     def _state_at(self, chain: FlyByChain, index: int, s: float) -> Array:

@@ -88,7 +88,7 @@ def straightened(chain: FlyByChain) -> StraightenedChain:
         for k, (_, end) in enumerate(groups[:-1])
     ]
     tempos = [
-        min([*chain.tempos[first : last + 1], *(corner.tempo for corner in chain.corners[first:last])])
+        min([*chain.tempos[first : last + 1], *(corner.pace for corner in chain.corners[first:last])])
         for first, last in groups
     ]
     first_share = _shares_of_line(chain.courses[slice(groups[0][0], groups[0][1] + 1)])[1]

@@ -5,8 +5,9 @@ Along other paths typical bounds stand for them; how much faster or slower the e
 that were found sets the pace of a second search.
 
 Where a part of the motion is over a limit, its pace alone is lowered until it is not: with time scaled by f,
-velocities go with f, accelerations with f^2, jerks with f^3. Where it leaves its zone, smaller borders are
-tried, then a slower pace.
+velocities go with f, accelerations with f^2, jerks with f^3. Where the tool is over a limit in a zone, that
+derivative of the joints alone is lowered, or the pace, whichever is faster. Where it leaves its zone, smaller
+borders are tried, then a slower pace.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.flown_parts import FlownPart, findings_of
-from trajcli.planners.flying_by.motion_search import MotionSearch, with_paces
+from trajcli.planners.flying_by.motion_search import POWERS, MotionSearch, duration_of, with_shares
 from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import State
 
@@ -88,7 +89,7 @@ def duration_within(chain: FlownChain, move: int, robot: Robot) -> float:
     courses[number] = replace(courses[number], robot=robot)  # type: ignore[type-var]
     zones = [corner.around for corner in chain.chain.corners]
     _, parts, _ = _within_limits(courses, zones, chain.chain.ends)
-    return math.fsum(part.curve.duration for part in parts)
+    return duration_of(parts)
 
 
 def second_order_bound(chain: FlownChain) -> float:
@@ -171,30 +172,51 @@ def _rates_along(course: Course, start: State) -> Array:
 def _within_limits(
     courses: Sequence[Course], zones: Sequence[ZoneAround], ends: tuple[Array, Array]
 ) -> tuple[FlyByChain, list[FlownPart], float]:
-    """Return the fastest chain found whose parts keep all limits and zones, its parts, and its `model`."""
+    """Return the fastest chain found whose parts keep all limits and zones, its parts, and its `model`.
+
+    Raises:
+        PlanningError: When none is found.
+    """
+    found, errors = [], []
+    for by_order in (True, False):
+        search = MotionSearch(by_order=by_order)
+        try:
+            found.append((*_kept(courses, zones, ends, search), search.model))
+        except PlanningError as error:
+            errors.append(error)
+        if not search.lowered:
+            break
+    if not found:
+        raise errors[0]
+    return min(found, key=lambda each: duration_of(each[1]))
+
+
+def _kept(
+    courses: Sequence[Course], zones: Sequence[ZoneAround], ends: tuple[Array, Array], search: MotionSearch
+) -> tuple[FlyByChain, list[FlownPart]]:
+    """Return the fastest chain that a search finds whose parts keep all limits and zones, and its parts."""
     from trajcli.planners.flying_by.straight import straightened
 
     count = len(zones)
     sizes = [0] * count
-    paces, tempos = np.ones(count), np.ones(len(courses))
-    search = MotionSearch()
+    shares, tempos = np.ones((count, 3)), np.ones(len(courses))
     for _ in range(_ROUNDS):
         chain = chain_of(courses, zones, ends, [_SIZES[size] for size in sizes])
-        chain = replace(with_paces(chain, paces), tempos=tuple(tempos.tolist()))
+        chain = replace(with_shares(chain, shares), tempos=tuple(tempos.tolist()))
         straight = straightened(chain)
         joined = search.fastest(straight.joined)
-        paces[straight.corners] = [corner.tempo for corner in search.chain.corners]
-        chain = with_paces(chain, paces)
+        shares[straight.corners] = search.shares
+        chain = with_shares(chain, shares)
         parts = straight.parts(joined)
-        if not _lowered(chain, parts, sizes, paces, tempos):
-            return chain, straight.parts(search.bolder(joined)), search.model
-        if min(paces.min(), tempos.min()) < _SLOWEST:
+        if not _lowered(chain, parts, sizes, shares, tempos):
+            return chain, straight.parts(search.bolder(joined))
+        if min((shares ** (1 / POWERS)).min(), tempos.min()) < _SLOWEST:
             break
     raise PlanningError("no motion through its zones keeps all limits")
 
 
 def _lowered(
-    chain: FlyByChain, parts: Sequence[FlownPart], sizes: list[int], paces: Array, tempos: Array
+    chain: FlyByChain, parts: Sequence[FlownPart], sizes: list[int], shares: Array, tempos: Array
 ) -> bool:
     """Lower the pace of parts that are over a limit, and the size of zones that are left.
 
@@ -208,12 +230,16 @@ def _lowered(
             continue
         changed = True
         k, in_zone = divmod(number, 2)
-        row = paces if in_zone else tempos
         factors = [finding.factor for finding in findings]
         if None not in factors:
-            row[k] /= max(f for f in factors if f is not None) * (1 + _MORE)
+            slower = 1 / (max(f for f in factors if f is not None) * (1 + _MORE))
         elif in_zone and sizes[k] + 1 < len(_SIZES):
             sizes[k] += 1
+            continue
         else:
-            row[k] *= _LESS
+            slower = _LESS
+        if in_zone:
+            shares[k] *= slower**POWERS
+        else:
+            tempos[k] *= slower
     return changed

@@ -72,7 +72,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
 
         turns = path.poses.pure_rotation
         along = (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)
-        of_law = _jerk_of_law(tcp, angular=path.poses.pure_rotation)
+        of_law = jerk_of_law(tcp, angular=path.poses.pure_rotation)
         keeps_jerk = bool(of_law) or _moving(curve)[np.isfinite(limits.jerk).any(axis=1)].any()
 
         def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
@@ -107,7 +107,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     return JointMotion(trajectory, motion, tuple(phases), events, plane, 2 if keeps_jerk else 1)
 
 
-def _jerk_of_law(limits: ToolLimits, *, angular: bool) -> tuple[LawJerkConstraint, ...]:
+def jerk_of_law(limits: ToolLimits, *, angular: bool) -> tuple[LawJerkConstraint, ...]:
     """Return the constraint of the jerk of the tool along its path; none where it has no limit, or rests."""
     return () if angular or math.isinf(limits.jerk) else (LawJerkConstraint(limits.jerk),)
 
