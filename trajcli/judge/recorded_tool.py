@@ -71,12 +71,14 @@ class ToolJudge:
         self._worst = Collector()
         self._moved, self._seen = 0.0, -1
         self.notes: list[str] = []
-        known = {move.index: move for move in moves}
+        by_index = {move.index: move for move in moves}
         for move, motion in (paths or {}).items():
             if motion is not None and (motion.path is None or motion.overlaps):
                 self.notes.append(f"move {move}: its segments overlap, the distance from them is not judged")
             elif motion is not None:
-                arm, parts = (known[move].robot, known[move].planned.parts) if move in known else (robot, ())
+                arm, parts = (
+                    (by_index[move].robot, by_index[move].planned.parts) if move in by_index else (robot, ())
+                )
                 self._recorded[move] = RecordedPath(arm, motion, move, self._worst, parts)
 
     def see(
