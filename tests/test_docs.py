@@ -375,3 +375,13 @@ def test_pictures_are_compared_by_what_they_show(wrong: str, right: str, *, same
     assert changed != PICTURE
     assert same_picture(PICTURE.encode(), changed.encode()) is same
     assert same_picture(changed.encode(), PICTURE.encode()) is same
+
+
+def test_every_source_of_the_literature_is_cited_by_name_and_year() -> None:
+    rows = re.findall(
+        r"^\| (.+ \(\d{4}\)) \|", (ROOT / "docs/literature.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    texts = " ".join(path.read_text(encoding="utf-8") for path in (ROOT / "trajcli").rglob("*.py"))
+    words = " ".join(texts.split())
+    assert len(rows) >= 20
+    assert [row for row in rows if row not in words] == []

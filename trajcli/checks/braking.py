@@ -133,7 +133,6 @@ def _beside_braking(
 
 
 def _with_joint(peaks: Peaks, other: Peaks, joint: int) -> Peaks:
-    """Return the extremes with those of one joint taken from others."""
     chosen = np.arange(peaks.low.size) == joint
     names = ("low", "low_time", "high", "high_time")
     return Peaks(*(np.where(chosen, getattr(other, name), getattr(peaks, name)) for name in names))

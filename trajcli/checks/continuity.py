@@ -213,7 +213,6 @@ class _Jumps:
 
 
 def _together(parts: Sequence[_Chosen]) -> _Chosen:
-    """Return the jumps of all parts."""
     names = ("rows", "joints", "owners", "sizes", "allowed")
     return _Chosen(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 

@@ -67,7 +67,6 @@ def _check_pins(
 
 
 def _beside(trajectory: Trajectory, span: Span, joint: int, value: float, limit: float) -> Finding:
-    """Return the finding of a joint that ends beside its target."""
     return Finding(
         move=span.index,
         joint=trajectory.joint_names[joint],

@@ -171,7 +171,6 @@ def _of_owners(cuts: Peaks, owner: NDArray[np.intp]) -> Peaks:
 
 
 def _joined(parts: Sequence[Peaks]) -> Peaks:
-    """Return the extremes of intervals that follow each other, each of shape (m, n)."""
     names = ("low", "low_time", "high", "high_time")
     low, low_time, high, high_time = (np.concatenate([getattr(p, name) for p in parts]) for name in names)
     return Peaks(low, low_time, high, high_time)
@@ -334,7 +333,6 @@ def _bracketed(coefficients: Array, ends: tuple[Array, Array], values: tuple[Arr
 
 
 def _with_slope(coefficients: Array, x: Array) -> tuple[Array, Array]:
-    """Return value and derivative of the polynomials (degree + 1, m) at `x` (m,)."""
     value, slope = coefficients[0], np.zeros_like(x)
     for row in coefficients[1:]:
         slope = slope * x + value
@@ -379,7 +377,6 @@ def _pieces_of(curve: PiecewisePolynomial, intervals: Array) -> tuple[NDArray[np
 
 
 def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
-    """Return the parts of pieces that make up intervals (m, 2)."""
     start, end = intervals.T
     low, high = _pieces_of(curve, intervals)
     counts = high - low + 1

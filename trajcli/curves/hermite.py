@@ -9,7 +9,7 @@ and the Taylor coefficients of u^k r at u = 1 are c_i = e_i - sum_j C(j, i) a_j.
 that of u^-k = sum_m (-1)^m C(k + m - 1, m) (u - 1)^m gives r around u = 1; a shift gives it around 0. All
 matrices are integer, so a boundary value enters with its own rounding error and no other.
 
-Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 2.1.
+Source: Biagiotti and Melchiorri (2008), section 2.1.
 """
 
 from __future__ import annotations

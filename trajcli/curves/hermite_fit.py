@@ -143,7 +143,6 @@ class _Pieces:
         return hermite_coefficients(self.left, self.right, (self.end - self.start)[:, None])
 
     def at(self, kept: np.ndarray) -> _Pieces:
-        """Return some of the pieces."""
         return _Pieces(self.start[kept], self.end[kept], self.left[:, kept], self.right[:, kept])
 
     def probes(self) -> Array:
@@ -265,7 +264,6 @@ def _divided(pieces: _Pieces, parts: RowIndices, nearer: NDArray[np.bool_], gues
 
 
 def _joined(pieces: list[_Pieces]) -> PiecewisePolynomial:
-    """Return all pieces in order as one curve."""
     start = np.concatenate([some.start for some in pieces])
     order = np.argsort(start)
     coefficients = np.concatenate([some.coefficients() for some in pieces], axis=1)[:, order]

@@ -72,7 +72,6 @@ class PhaseChain:
 
     @cached_property
     def _seen(self) -> _Seen:
-        """What the phases do, seen once."""
         states, leftover, driving = self._walk_of_third_order() if self.order == _ORDER else self._walk()
         columns, final = zip(*states, strict=True), self.final
         # NaN is larger than nothing
@@ -303,7 +302,6 @@ class PhaseChain:
         return np.array(rows)
 
     def _with(self, durations: Sequence[float], constants: Sequence[float]) -> PhaseChain:
-        """Return the motion with other phases, as many."""
         return PhaseChain(self.initial, self.final, tuple(durations), tuple(constants), self.cruising)
 
 

@@ -12,8 +12,7 @@ The double S has seven phases. Velocity rises by jerk, constant acceleration and
 same way. `t_j` is the duration of each of the four phases with jerk, `t_a` that of each of the two with
 constant acceleration, `t_v` the cruise's.
 
-Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008),
-sections 2.2.2 and 3.4.
+Source: Biagiotti and Melchiorri (2008), sections 2.2.2 and 3.4.
 """
 
 from __future__ import annotations

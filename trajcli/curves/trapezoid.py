@@ -6,8 +6,7 @@ T = (V - w0)/a + (V - w1)/d + cruise. What runs away from the target at the star
 behind it at the end, is a ramp to or from rest before or after that.
 The velocity is linear between knots, and the position a chain of parabolas.
 
-Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), sections 3.2
-and 3.2.7; Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
+Source: Biagiotti and Melchiorri (2008), sections 3.2 and 3.2.7; Siciliano et al. (2009), section 4.2.1.
 """
 
 from __future__ import annotations
@@ -271,12 +270,10 @@ class _ThreePartMotion:
     rates: MotionBounds
 
     def mirrored(self) -> _ThreePartMotion:
-        """Return the motion in the opposite direction."""
         before, after = self.before.mirrored(), self.after.mirrored()
         return replace(self, before=before, after=after, direction=-self.direction)
 
     def with_middle(self, middle: VelocityProfile) -> VelocityProfile:
-        """Return the whole profile."""
         signed = middle if self.direction > 0 else middle.mirrored()
         return self.before.then(signed).then(self.after)
 
@@ -315,14 +312,12 @@ def _motion_parts(
 
 
 def _ramp(initial: float, final: float, rates: MotionBounds) -> VelocityProfile:
-    """Return the profile from one velocity to another, of one sign."""
     faster = abs(final) > abs(initial)
     rate = rates.acceleration if faster else rates.deceleration
     return VelocityProfile(initial, ((abs(final - initial) / rate, final),))
 
 
 def _fastest_middle(motion: _ThreePartMotion) -> VelocityProfile:
-    """Return the middle that takes the least time."""
     if motion.distance == 0:
         return VelocityProfile(motion.initial)
     distance, initial, final, rates = motion.distance, motion.initial, motion.final, motion.rates

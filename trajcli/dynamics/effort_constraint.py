@@ -6,8 +6,7 @@ belongs to g. Viscous friction v q' sd is not linear in x. Where it takes from w
 bounded by the tangent at a speed r, sd <= r / 2 + x / (2 r), where it gives by the chord to the largest
 speed, sd >= x / cap: both are on the safe side, whatever r is, and the first is exact where sd = r.
 
-Source: Bobrow, Dubowsky and Gibson, Time-optimal control of robotic manipulators along specified paths, Int.
-J. Robotics Research 4 (1985); the bounds of viscous friction are our own.
+Source: Bobrow, Dubowsky and Gibson (1985); the bounds of viscous friction are our own.
 """
 
 from __future__ import annotations

@@ -6,8 +6,7 @@ with velocities and accelerations, in which gravity is an acceleration of the ba
 with forces and moments.
 
 Source: Luh, Walker and Paul, On-line computational scheme for mechanical manipulators, J. Dynamic Systems,
-Measurement, and Control 102 (1980); Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning
-and Control (2009), section 7.5.
+Measurement, and Control 102 (1980); Siciliano et al. (2009), section 7.5.
 """
 
 from __future__ import annotations
@@ -379,7 +378,6 @@ def _recursion(
 
 
 def _turn(link: DynamicLink, value: Array) -> tuple[Entry, Entry, Entry]:
-    """Return cosine and sine of the turn about z of a joint, and the slide along z."""
     if link.prismatic:
         cosine, sine = cos_sin(link.theta)
         return float(cosine), float(sine), total(product(link.sign, value), link.d)
@@ -454,7 +452,6 @@ def _wrench(
 
 
 def _times(second: Sequence[float], vector: VectorEntries) -> VectorEntries:
-    """Return the product of a symmetric tensor and a vector."""
     xx, yy, zz, xy, xz, yz = second
     return dot((xx, xy, xz), vector), dot((xy, yy, yz), vector), dot((xz, yz, zz), vector)
 

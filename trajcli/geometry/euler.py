@@ -5,8 +5,8 @@ alone, so c and b are read from it; a follows from R R_k(-c), whose column j is 
 makes the three angles reproduce R to rounding even where a and c are hardly determined. The same angles on
 fixed axes belong to the reversed sequence: R_k(c) R_j(b) R_i(a).
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-2.4, worked out for all axes at once by the parity p of (i, j, third axis).
+Source: Siciliano et al. (2009), section 2.4, worked out for all axes at once by the parity p of (i, j, third
+axis).
 """
 
 from __future__ import annotations

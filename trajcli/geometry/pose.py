@@ -73,7 +73,7 @@ def log_pose(pose: Array) -> Array:
     v = V^-1 t with V^-1 = I - K/2 + ((1 - (a/2) cot(a/2)) / a^2) K^2, K the cross matrix of the rotation
     vector of length a.
 
-    Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3.
+    Source: Murray, Li and Sastry (1994), section 2.3.
     """
     vector = log(pose[..., :3, :3])
     square = np.einsum("...i,...i", vector, vector)[..., None, None]

@@ -3,8 +3,7 @@
 A series here bounds the size of another one, coefficient by coefficient (it is a majorant of it); so do sums,
 products and exponentials of such series, cut off where they are.
 
-Source: the method of majorants, as in Krantz and Parks, A Primer of Real Analytic Functions (2002), section
-1.3.
+Source: the method of majorants, as in Krantz and Parks (2002), section 1.3.
 """
 
 from __future__ import annotations

@@ -265,7 +265,7 @@ def exp(vector: ArrayLike) -> Array:
 
     R = I + (sin t / t) K + ((1 - cos t) / t^2) K^2, both quotients by way of sin(x)/x, exact at 0.
 
-    Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), eq. 2.14.
+    Source: Murray, Li and Sastry (1994), eq. 2.14.
     """
     values = np.asarray(vector, dtype=np.float64)
     angle = np.linalg.norm(values, axis=-1)[..., None, None]

@@ -4,8 +4,7 @@ The axis of a slide is a direction, so that its row has no lengths: B Tz(q) Rx(a
 stands, with the z axis of B along the rail, its x axis along the common normal of rail and first joint, and c
 added to the theta of that joint.
 
-Source: Denavit and Hartenberg, A kinematic notation for lower-pair mechanisms based on matrices, Journal of
-Applied Mechanics (1955).
+Source: Denavit and Hartenberg (1955).
 """
 
 from __future__ import annotations

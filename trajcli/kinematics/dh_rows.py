@@ -4,8 +4,7 @@ Rows are standard ones. The z axis of a row's frame is turned along the joint's 
 needed. The line of a slide is free: it is drawn through the origin that the row before leaves. Where two axes
 are almost parallel their common normal is far off, and the row takes Hayati's turn about y, with d = 0.
 
-Source: Denavit and Hartenberg, A kinematic notation for lower-pair mechanisms based on matrices, Journal of
-Applied Mechanics (1955); Hayati, Robot arm geometric link parameter estimation, IEEE CDC (1983).
+Source: Denavit and Hartenberg (1955); Hayati (1983).
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ def forward(robot: Robot, q: ArrayLike) -> Array:
         InputError: When the robot has no geometry, or q has not n finite values.
 
     Source: Denavit and Hartenberg, A kinematic notation for lower-pair mechanisms, J. Applied Mechanics 22
-    (1955); modified rows after Craig, Introduction to Robotics (2005), section 3.4.
+    (1955); modified rows after Craig (2005), section 3.4.
     """
     links, values = links_of(robot), configurations(robot, q)
     poses = np.empty((values.size // values.shape[-1], 4, 4))

@@ -46,8 +46,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: ReferenceFrame = "world") -> Arr
     Raises:
         InputError: When the robot has no geometry, or q has not n finite values.
 
-    Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009),
-    section 3.1.3.
+    Source: Siciliano et al. (2009), section 3.1.3.
     """
     links, values = links_of(robot), configurations(robot, q)
     result = np.zeros((values.size // values.shape[-1], 6, len(links)))
@@ -94,8 +93,7 @@ def jacobian_dot_qd(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceF
     Raises:
         InputError: When the robot has no geometry, or q and qd have not n finite values of the same batch.
 
-    Source: the columns of the geometric Jacobian differentiated; compare Siciliano, Sciavicco, Villani and
-    Oriolo, Robotics: Modelling, Planning and Control (2009), chapter 3.
+    Source: the columns of the geometric Jacobian differentiated; compare Siciliano et al. (2009), chapter 3.
     """
     links, values, rates = links_of(robot), *_state(robot, q, qd)
     result = np.zeros((values.size // values.shape[-1], 6))

@@ -207,7 +207,7 @@ class Joint:
 
     Effort, friction, rotor and link are those of inverse dynamics, `trajcli/dynamics/`.
 
-    Source: Hayati, Robot arm geometric link parameter estimation, IEEE CDC (1983), for beta.
+    Source: Hayati (1983), for beta.
     """
 
     name: str

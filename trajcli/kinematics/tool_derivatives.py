@@ -33,8 +33,7 @@ def tool_derivatives(robot: Robot, rates: Sequence[Array]) -> Array:
     Raises:
         InputError: When the robot has no geometry, or a value is not finite.
 
-    Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009),
-    section 3.1.2, differentiated again.
+    Source: Siciliano et al. (2009), section 3.1.2, differentiated again.
     """
     links, values = links_of(robot), [configurations(robot, each) for each in rates]
     order = len(values) - 1

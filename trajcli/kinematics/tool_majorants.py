@@ -4,8 +4,7 @@ Let u_i(r) bound what joint i does within r of any time of a piece: its coeffici
 rotation about the axes of joints 1 to k is then bounded, coefficient by coefficient, by exp(u_1 + ... + u_k),
 because every factor of it is an exponential; and so is a link that is turned by them.
 
-Source: the method of majorants, as in Krantz and Parks, A Primer of Real Analytic Functions (2002), section
-1.3.
+Source: the method of majorants, as in Krantz and Parks (2002), section 1.3.
 """
 
 from __future__ import annotations

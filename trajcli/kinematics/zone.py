@@ -229,7 +229,6 @@ class _Intervals:
         return speed, rise
 
     def halved(self, some: NDArray[np.bool_]) -> _Intervals:
-        """Return both halves of some of them, (P,)."""
         coefficients, half = self.coefficients[:, some], 0.5 * self.lengths[some]
         later = taylor_shift(coefficients, half[:, None])
         starts = self.starts[some]

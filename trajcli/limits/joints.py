@@ -179,7 +179,6 @@ def peaks_by_move(trajectory: Trajectory) -> IntervalPeaks:
 
 
 def _peaks(curve: PiecewisePolynomial, spans: Array) -> IntervalPeaks:
-    """Return the extremes between times (m, 2), s from the start of the curve."""
     return peaks_between(curve, _on_breaks(spans + curve.start, curve.breaks))
 
 

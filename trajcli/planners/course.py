@@ -3,7 +3,7 @@
 Along a path qd = q' sd, qdd = q' sdd + q'' sd^2 and qddd = q' sddd + 3 q'' sd sdd + q''' sd^3. About a speed
 and an acceleration of the law the terms of bends are known, and bounds of one variable are left.
 
-Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 9.5.
+Source: Biagiotti and Melchiorri (2008), section 9.5.
 """
 
 from __future__ import annotations

@@ -5,8 +5,7 @@ phases are then corrected to end in their target, which ruckig misses by up to 1
 together in the shortest time in which each can arrive: the set of such times may have gaps, so the time is
 raised until all agree.
 
-Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
-(RSS 2021).
+Source: Berscheid and Kroeger (2021).
 """
 
 from __future__ import annotations
@@ -486,5 +485,4 @@ def _profile(
 
 
 def _apart(phases: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the durations of phases and their constants."""
     return tuple(time for time, _ in phases), tuple(constant for _, constant in phases)

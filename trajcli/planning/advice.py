@@ -42,7 +42,6 @@ def with_tested_advice(verdict: Verdict, moves: Sequence[PlannedMove], say: Say)
 
 
 def _advised(own: list[Finding], move: PlannedMove, moves: Sequence[PlannedMove], say: Say) -> list[Finding]:
-    """Return the findings of one move with their advice."""
     if any(finding.kind == _STEP for finding in own):
         hint = _without_steps(own, move, moves)
         own = [replace(f, hint=hint) if f.kind in (_STEP, "jerk") else f for f in own]
@@ -111,7 +110,6 @@ def _planned(move: PlannedMove, planner: Planner, robot: Robot | None = None) ->
 
 
 def _kinds(move: PlannedMove) -> set[str]:
-    """Return the kinds of findings about a move alone."""
     return {f.kind for f in verify(move.alone(), [move.robot.limits], [move.promise]).findings}
 
 
@@ -145,7 +143,6 @@ def _smoother(move: PlannedMove) -> str:
 
 
 def _changed(move: PlannedMove, change: Mapping[str, Any]) -> PlannedMove | None:
-    """Return the move with other fields, which may be another planner's; None where that is not possible."""
     other = changed(move.planner, change)
     return None if other is None else _planned(move, other)
 

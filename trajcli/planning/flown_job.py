@@ -193,7 +193,6 @@ def _adapted(move: PlannedMove, chain: Sequence[PlannedMove], adapted: Adaptatio
 
 
 def _aligned(chain: FlownChain, rate: float) -> FlownChain:
-    """Return the chain that lasts a whole number of periods."""
     periods = max(1, math.ceil(chain.duration * rate - _WHOLE))
     return stretched_chain(chain, periods / rate / chain.duration)
 

@@ -116,7 +116,6 @@ class _Search:
         self._plans: dict[float, Plan | TrajcliError] = {}
 
     def attempt(self, mass: float) -> Plan | TrajcliError:
-        """Return the plan with a mass, or why there is none."""
         if mass not in self._plans:
             try:
                 with progress_of(f"trial {len(self._plans) + 1}, {mass:.9g} kg"):
@@ -130,7 +129,6 @@ class _Search:
         return payload if own is None else Payload(mass, own.com, own.inertia)
 
     def passes(self, mass: float) -> bool:
-        """Return whether the job verifies with a mass."""
         plan = self.attempt(mass)
         return isinstance(plan, Plan) and plan.verdict.passed
 
@@ -302,7 +300,6 @@ class _Search:
 
 
 def _same_motion(a: Plan | TrajcliError, b: Plan | TrajcliError) -> bool:
-    """Return whether two plans are the same motion."""
     if not (isinstance(a, Plan) and isinstance(b, Plan)):
         return False
     one, other = a.trajectory.curve, b.trajectory.curve
@@ -326,6 +323,5 @@ def _masses_at_limit(move: PlannedMove, payload: Payload) -> Iterator[float]:
 
 
 def _efforts(robot: Robot, payload: Payload, mass: float, q: Array, rates: tuple[Array, Array]) -> Array:
-    """Return the efforts of states (N, n) with another mass."""
     carrying = replace(robot, payload=Payload(mass, payload.com, payload.inertia))
     return InverseDynamics(carrying).effort(q, *rates)

@@ -284,7 +284,6 @@ def _resolved(
 
 
 def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
-    """Return what was conceded to reach a pose."""
     if pose is None:
         return []
     from trajcli.planning.resolve_poses import branch_events, nearest_rotation_events
@@ -357,7 +356,6 @@ def _velocity_steps(trajectory: Trajectory) -> Iterator[Event]:
 
 
 def _first_moving(moves: Sequence[PlannedMove]) -> PlannedMove:
-    """Return the first of the moves that does not only take up a payload."""
     return next(move for move in moves if not move.planner.handles)
 
 
@@ -488,6 +486,5 @@ def _with_unit_hint(verdict: Verdict, loaded: LoadedJob) -> Verdict:
 
 
 def _in_units(verdict: Verdict, loaded: LoadedJob) -> Verdict:
-    """Return the verdict whose messages say their numbers in the units of the job."""
     findings = (replace(f, message=f.text(loaded.say), amounts={}, unit=f.si_unit) for f in verdict.findings)
     return replace(verdict, findings=tuple(findings))

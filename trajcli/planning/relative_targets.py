@@ -73,7 +73,6 @@ class Stand:
         return self.joints
 
     def _pose(self, target: Target) -> Array:
-        """Return the pose (4, 4) that a target has."""
         if self.robot.convention is None:
             hint = "give its joints theta, d, a and alpha"
             raise InputError(

@@ -147,7 +147,6 @@ def branch_events(pose: ResolvedPose) -> list[Event]:
 def _of_configuration(
     wanted: Configuration | None, names: list[str], robot: Robot, method: str
 ) -> NDArray[np.bool_]:
-    """Return which branches have the wanted names."""
     chosen = np.ones(len(names), dtype=bool)
     for word in ({} if wanted is None else wanted.branch_names).values():
         has = np.array([word in name.split() for name in names])

@@ -200,7 +200,6 @@ def _stretched(
 def _event(
     kind: str, how: str, move: PlannedMove, slower: PlannedMove, over: Sequence[Finding], remark: str = ""
 ) -> Event:
-    """Return the event of a move that lasts longer because of its findings."""
     worst = max(over, key=lambda finding: finding.factor or 0.0)
     limit = KIND_OF[worst.kind].words
     message = f"{how}, from {{before}} to {{after}}, to keep the {limit} limit of {{whose}}{remark}"

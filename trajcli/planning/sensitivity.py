@@ -120,7 +120,6 @@ def times_at_limits(
 
 
 def _times_of_phases(move: PlannedMove) -> tuple[TimeAtLimit, ...]:
-    """Return for how long limits of joints bind by the phases of the move."""
     seconds: dict[tuple[int, BindingQuantity], float] = {}
     for phase in move.planned.phases:
         named = [quantity for quantity in _BINDING if phase.name.split()[0] == quantity]

@@ -6,8 +6,8 @@ acceleration dv / d for the velocity step dv; so the curve passes the waypoint a
 Where the half blends of neighbours need more than the segment between them lasts, all its blends are
 shrunk by the same factor, so that they just touch; a blend that two segments shrink takes the smaller factor.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2, for "centred"
-ends; Craig, Introduction to Robotics (2005), section 7.3, for "inside" ends and blends by acceleration.
+Source: Siciliano et al. (2009), section 4.2.2, for "centred" ends; Craig (2005), section 7.3, for "inside"
+ends and blends by acceleration.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ e = dq - v0 h, the displacement that is left when the joint keeps its first velo
 
     one blend of duration d inside:    a d (h - d / 2) = |e|,    real for a >= 2 |e| / h^2.
 
-Source: Craig, Introduction to Robotics (2005), section 7.3, equations 7.24 to 7.28, for v0 = 0.
+Source: Craig (2005), section 7.3, equations 7.24 to 7.28, for v0 = 0.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ Newton's method with a logarithmic barrier follows its minimum. Each constraint 
 step solves a system of 2 x 2 blocks on three diagonals. The curvature of the last constraint,
 which is not convex, is left out: so every step goes downhill, and the end is a local minimum.
 
-Source: Boyd and Vandenberghe, Convex Optimization (2004), chapter 11, for the barrier method.
+Source: Boyd and Vandenberghe (2004), chapter 11, for the barrier method.
 """
 
 from __future__ import annotations
@@ -76,7 +76,6 @@ def fastest_blends(
 
 
 def _refuse_bounds(velocity: Array, acceleration: Array, moving: NDArray[np.bool_]) -> None:
-    """Raise ValueError where limits do not allow a fastest motion."""
     for name, bounds in (("velocity", velocity), ("acceleration", acceleration)):
         wrong = ~((bounds[:, 0] < 0) & (bounds[:, 1] > 0))
         if wrong.any():
@@ -154,7 +153,6 @@ def _problem(displacements: Array, velocity: Array, acceleration: Array) -> _Pro
 
 
 def _minimum(problem: _Problem, d: Array, x: Array) -> tuple[Array, Array]:
-    """Return blends and x at the minimum, from values inside all constraints."""
     count = problem.after.size + 2 * x.size
     weight, gap = _total(d, x) / count, 1.0
     while True:
@@ -169,7 +167,6 @@ def _minimum(problem: _Problem, d: Array, x: Array) -> tuple[Array, Array]:
 
 
 def _total(d: Array, x: Array) -> float:
-    """Return the duration of the motion."""
     return float((1 / x).sum() + (d[0] + d[-1]) / 2)
 
 

@@ -193,7 +193,6 @@ def _equations_from_before(lengths: Array, slopes: Array) -> KnotEquations:
 
 
 def _velocity(points: Waypoints, velocity: ArrayLike | None, name: str) -> Array | None:
-    """Return a velocity (n,) that may be given."""
     return None if velocity is None else points.row(velocity, f"{name} velocity")
 
 
@@ -265,7 +264,6 @@ def _accelerations(points: Waypoints, outer: Sequence[Array | None], end: _End) 
 
 
 def _natural_end(outer: KnotEquations, inner: KnotEquations, _lengths: Array) -> None:
-    """Let the acceleration at the end be zero."""
     without_acceleration(outer, inner)
 
 

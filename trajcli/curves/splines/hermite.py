@@ -1,8 +1,7 @@
 """Hermite splines: curves through waypoints with known derivatives there, and rules that choose these.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-4.2.1; for the bound of three slopes de Boor and Swartz, Piecewise monotone interpolation, J. Approx. Theory
-21 (1977).
+Source: Siciliano et al. (2009), section 4.2.1; for the bound of three slopes de Boor and Swartz, Piecewise
+monotone interpolation, J. Approx. Theory 21 (1977).
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ is convex. Newton's steps need the slopes of c: durations far from a piece hardl
 one is varied at once, and the Hessian diag(h) + mu sum (c'_i c'_i^T) / c_i^2 is banded. The slopes change
 slowly, so that they serve several steps. All costs are proportional to the number of points.
 
-Source: Boyd and Vandenberghe, Convex Optimization (2004), sections 11.2 and 11.3; Curtis, Powell and Reid, On
-the estimation of sparse Jacobian matrices, J. Inst. Math. Appl. 13 (1974).
+Source: Boyd and Vandenberghe (2004), sections 11.2 and 11.3; Curtis, Powell and Reid, On the estimation of
+sparse Jacobian matrices, J. Inst. Math. Appl. 13 (1974).
 """
 
 from __future__ import annotations
@@ -164,7 +164,6 @@ def _centred(problem: _Problem, point: _Point, weight: float, enough: float) -> 
 
 
 def _renewed(problem: _Problem, point: _Point) -> _Point:
-    """Return the point with slopes of its own."""
     return _Point(point.y, point.uses, point.y, problem.slopes(point.y, point.uses))
 
 
@@ -234,7 +233,6 @@ def _excess(family: CurveFamily, durations: Array, bounds: Array) -> float:
 
 
 def _orders(bounds: Array) -> list[int]:
-    """Return the derivatives that are limited at all."""
     return [order for order in (1, 2, 3) if np.isfinite(bounds[order - 1]).any()] or [1]
 
 

@@ -7,8 +7,7 @@ Inside an end interval the acceleration runs from the given a over the virtual p
 waypoint. What the given state leaves of the displacement fixes M; so the interval is eliminated in closed
 form, and the inner waypoints keep a system dominated by its diagonal, wherever the virtual points lie.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-4.2.1; the same curve, with other unknowns.
+Source: Siciliano et al. (2009), section 4.2.1; the same curve, with other unknowns.
 """
 
 from __future__ import annotations
@@ -104,7 +103,6 @@ class _EndState:
     acceleration: Array
 
     def backwards(self) -> _EndState:
-        """Return the state of the curve run backwards."""
         return _EndState(self.position, -self.velocity, self.acceleration)
 
     def after(self, time: float, acceleration: Array) -> _EndState:

@@ -13,9 +13,7 @@ motion begins or ends at rest it is linear: a quartic law from rest leaves no mo
 Velocity and acceleration are kept by the control points of what five samples of each interval tell: a rule
 of quadratics and quartics is bounded by them for all t. Jerk, which is nearly linear, is kept at three.
 
-Source: Debrouwere et al., Time-optimal path following for robots with convex-concave constraints using
-sequential convex programming (IEEE Transactions on Robotics 29(6), 2013); the parameter and the elements are
-our own.
+Source: Debrouwere et al. (2013); the parameter and the elements are our own.
 """
 
 from __future__ import annotations

@@ -4,8 +4,7 @@ Each of N + 1 nodes has two unknowns, so an interval sees four of them, p. Minim
 w (1 + f p)^-1/2 over some samples f of each interval, under rows g p <= c. Newton's matrix then has blocks of
 2 x 2 along three diagonals, and each step takes time in proportion to N.
 
-Source: Mehrotra, On the implementation of a primal-dual interior point method (SIAM Journal on Optimization
-2(4), 1992); Nocedal and Wright, Numerical Optimization, 2nd edition (2006), section 16.6.
+Source: Mehrotra (1992); Nocedal and Wright (2006), section 16.6.
 """
 
 from __future__ import annotations
@@ -70,7 +69,6 @@ class ChainProgram:
         return x
 
     def _first_pairs(self) -> _Pairs:
-        """Return slacks and multipliers to begin with."""
         slack = np.maximum(self.limits, _LEAST_SLACK)
         dual = _GAP / slack.size / slack
         if np.isinf(self.penalty):
@@ -130,7 +128,6 @@ class _Pairs:
 
     @property
     def gap(self) -> float:
-        """Sum of all products."""
         passed = float((self.passed * self.over).sum()) if self.elastic else 0.0
         return float((self.slack * self.dual).sum()) + passed
 

@@ -7,8 +7,7 @@ conditions at both ends. The trapezoidal rule with end correction is exact for i
 
 so h is the root of a quadratic, and the law is twice continuously differentiable for any nodes.
 
-Source: Davis and Rabinowitz, Methods of Numerical Integration
-(1984), on corrections at the ends.
+Source: Davis and Rabinowitz (1984), on corrections at the ends.
 """
 
 from __future__ import annotations

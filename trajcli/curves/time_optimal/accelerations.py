@@ -115,7 +115,6 @@ def _believed(
 
 
 def _filled(values: Array, others: Array) -> Array:
-    """Return values, or others where they are NaN."""
     return np.where(np.isnan(values), others, values)
 
 

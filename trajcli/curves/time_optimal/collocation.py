@@ -9,8 +9,7 @@ the equation of work and energy, without any error: no motion passes the ends of
 other constraints the integrals are trapezoids. Where a changes its sign the row holds at both ends with the
 mean of sdd; where all a vanish at an end and nothing bounds x there, the interval is passed without sdd.
 
-Source: Verscheure et al., Time-optimal path tracking for robots: a convex optimization approach, IEEE Trans.
-Automatic Control 54 (2009), for sd^2 as the variable; the rows by work and energy are our own.
+Source: Verscheure et al. (2009), for sd^2 as the variable; the rows by work and energy are our own.
 """
 
 from __future__ import annotations

@@ -5,8 +5,7 @@ whatever the motion, and loses as little: so no motion is faster at a grid point
 these rows alone, with the caps there. With its velocities at both ends of an interval so bounded each joint
 needs a time of its own, up to a peak and down again; the longest is a bound. It holds on any grid.
 
-Source: Bobrow, Dubowsky and Gibson, Time-optimal control of robotic manipulators along specified paths, Int.
-J. Robotics Research 4 (1985), for the two passes; the bound on any grid is our own.
+Source: Bobrow, Dubowsky and Gibson (1985), for the two passes; the bound on any grid is our own.
 """
 
 from __future__ import annotations
@@ -83,7 +82,6 @@ def _with_parameter(joints: JointConstraint, along: tuple[float, float]) -> Join
 
 
 def _with_turns(path: PiecewisePolynomial, grid: Array) -> Array:
-    """Return the grid with all places where a joint turns."""
     (turns,) = critical_points(path.coefficients, path.lengths, (0,))
     finer = distinct(np.concatenate([grid, (path.breaks[:-1, None] + turns).reshape(-1)]))
     apart = np.diff(finer) > _CLOSE * path.duration

@@ -216,7 +216,6 @@ class _Neighbourhoods:
         speeds.x[points] = solve_recurrence(P, R, C, (R > 0) & within, limits)
 
     def unchanged_at_border(self, before: Speeds, speeds: Speeds) -> bool:
-        """Return whether nothing changes at the border."""
         begins, ends = self.points[self.begins], self.points[self.ends]
         same = np.array_equal(speeds.x[ends], before.x[ends])
         same = same and np.array_equal(speeds.x[begins], before.x[begins])

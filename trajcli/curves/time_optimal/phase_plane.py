@@ -4,9 +4,8 @@ At a point of the path the rows a u + b x <= c leave room for some u = sdd up to
 which no upper bound of u falls below a lower one. Eliminating u (Fourier and Motzkin) gives one bound of x
 for each pair of a row with a > 0 and a row with a < 0; rows with a = 0 bound x alone.
 
-Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis,
-IEEE Trans. Robotics 34 (2018), section III (maximum velocity curve); Lynch and Park, Modern Robotics (2017),
-section 9.4 (phase plane).
+Source: Pham and Pham (2018), section III (maximum velocity curve); Lynch and Park (2017), section 9.4 (phase
+plane).
 """
 
 from __future__ import annotations

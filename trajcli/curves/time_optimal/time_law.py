@@ -3,7 +3,7 @@
 A piece over the length D, from the speed v and the acceleration a to w and b, lasts T with
 D = T (v + w) / 2 - T^2 (b - a) / 12. Where sdd is constant, sd^2 is linear in s, and the piece quadratic.
 
-Source: Davis and Rabinowitz, Methods of Numerical Integration (1984), on corrections at the ends.
+Source: Davis and Rabinowitz (1984), on corrections at the ends.
 """
 
 from __future__ import annotations

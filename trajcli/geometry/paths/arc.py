@@ -3,8 +3,8 @@
 p(f) = start - r (1 - cos f) x + r sin f y + (pitch / 2 pi) f z, with z the axis, x from the center to the
 start, y = z cross x and f the angle. One radian is sqrt(r^2 + (pitch / 2 pi)^2) of arc length.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-4.2.2; there, too, the parameter of a circle is its arc length, not its angle.
+Source: Siciliano et al. (2009), section 4.2.2; there, too, the parameter of a circle is its arc length, not
+its angle.
 """
 
 from __future__ import annotations

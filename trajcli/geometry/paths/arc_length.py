@@ -190,6 +190,5 @@ def _value(coefficients: Array, u: Array) -> Array:
 
 @cache
 def _gauss() -> tuple[Array, Array]:
-    """Return nodes and weights on [0, 1]."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     return (nodes + 1.0) / 2.0, weights / 2.0

@@ -212,7 +212,6 @@ class Chain:
         return result[0], result[1], result[2]
 
     def _local(self, part: int, s: Array) -> Array:
-        """Return the arc lengths of a part."""
         local: Array = np.clip(s - self.offsets[part], 0.0, self._lengths[part])
         return local
 
@@ -287,7 +286,6 @@ def _corner(
     asked: float,
     used: float,
 ) -> Corner:
-    """Return the corner of a pair of segments."""
     where, turn = pair[1].evaluate(np.zeros(1))[0][0], turn_between(*pair)
     if blend is None:
         return Corner(kind, s, where, turn, asked, used, 0.0)
@@ -295,7 +293,6 @@ def _corner(
 
 
 def _blend(index: int, before: PositionCurve, after: PositionCurve, radius: float) -> Blend | None:
-    """Return the blend in a corner; none for the radius 0."""
     if radius == 0.0:
         return None
     try:

@@ -5,7 +5,7 @@ K the curvature vector of the neighbour. Every speed v > 0 gives the same tangen
 is taken whose largest curvature is smallest, so that the blend can be gone through fast. Between lines its
 curvature is then at most 1.2 times that of the circular arc with the same ends.
 
-Source: Farin, Curves and Surfaces for CAGD (2002), chapter 11 (geometric continuity).
+Source: Farin (2002), chapter 11 (geometric continuity).
 """
 
 from __future__ import annotations

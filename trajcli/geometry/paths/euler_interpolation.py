@@ -1,7 +1,6 @@
 """Interpolation of Euler angles: each angle changes evenly, which is not the shortest rotation.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-4.3.3.
+Source: Siciliano et al. (2009), section 4.3.3.
 """
 
 from __future__ import annotations

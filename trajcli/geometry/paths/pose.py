@@ -3,7 +3,7 @@
 A screw is the motion at constant twist from one pose to another: the tool goes along a helix by its arc
 length.
 
-Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3.
+Source: Murray, Li and Sastry (1994), section 2.3.
 """
 
 from __future__ import annotations

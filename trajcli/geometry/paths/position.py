@@ -112,8 +112,7 @@ class Line(Smooth):
         start: Shape (3,), m.
         end: Shape (3,), m.
 
-    Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), eq.
-    4.34.
+    Source: Siciliano et al. (2009), eq. 4.34.
     """
 
     start: Array

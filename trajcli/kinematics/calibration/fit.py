@@ -92,9 +92,9 @@ def calibrate(
     Raises:
         InputError: When the robot has no geometry, or joint values are not finite.
 
-    Source: Levenberg (1944) and Marquardt (1963) as in Nocedal and Wright, Numerical Optimization (2006),
-    section 10.3; Hollerbach and Wampler, The calibration index and taxonomy for robot kinematic calibration
-    methods, Int. J. Robotics Research 15 (1996), for scaling and rank.
+    Source: Levenberg (1944) and Marquardt (1963) as in Nocedal and Wright (2006), section 10.3; Hollerbach
+    and Wampler, The calibration index and taxonomy for robot kinematic calibration methods, Int. J. Robotics
+    Research 15 (1996), for scaling and rank.
     """
     problem = _Problem(measurements, parameters, options)
     seen = problem.seen(robot)
@@ -122,7 +122,6 @@ class _Problem:
         self.weights = measurements.weights(options.length)
 
     def seen(self, robot: Robot) -> Identifiability:
-        """Return what the measurements tell at the parameters of a robot."""
         _, jacobian = self.rows(robot)
         return identifiability(
             jacobian.reshape(-1, len(self.parameters)), self.parameters, self.options.length

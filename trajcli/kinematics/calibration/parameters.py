@@ -61,7 +61,7 @@ def all_parameters(robot: Robot) -> tuple[ArmParameter, ...]:
     Between parallel axes the common normal can lie anywhere, and the d of a row jumps with the last digit of
     alpha; the tilt about y that beta describes is what is missing.
 
-    Source: Hayati, Robot arm geometric link parameter estimation, IEEE CDC (1983).
+    Source: Hayati (1983).
     """
     rows = (parameter for joint in range(len(robot.joints)) for parameter in row_parameters(robot, joint))
     return (*_pose_parameters("base"), *rows, *_pose_parameters("tool"))
@@ -106,7 +106,6 @@ def parse_parameters(robot: Robot, text: str) -> tuple[ArmParameter, ...]:
 
 
 def _named(robot: Robot, word: str) -> tuple[ArmParameter, ...]:
-    """Return the parameters that one word means."""
     names = robot.joint_names
     if word in ("all", "dh"):
         listed = all_parameters(robot)

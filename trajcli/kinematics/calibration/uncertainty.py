@@ -88,7 +88,6 @@ def uncertainty(
 def _undetermined(
     fit: Fit, jacobian: Array, parameters: Sequence[ArmParameter], options: Options
 ) -> set[ArmParameter]:
-    """Return the parameters of combinations that the fit leaves undetermined."""
     seen = fit.nominal
     if fit.released:
         seen = identifiability(jacobian.reshape(-1, len(parameters)), parameters, options.length)
@@ -121,7 +120,6 @@ def _noise(
 def _correlations(
     covariance: Array, deviations: Array, held: Sequence[bool], parameters: Sequence[ArmParameter]
 ) -> tuple[Correlation, ...]:
-    """Return the largest correlations of parameters that are known."""
     usable = [i for i, each in enumerate(held) if each and deviations[i] > 0]
     pairs = (
         Correlation(parameters[i], parameters[j], float(covariance[i, j] / (deviations[i] * deviations[j])))

@@ -1,7 +1,6 @@
 """Executed poses: a path as the arm follows it, turns that its targets leave free included.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-3.7: v = J q', a = J q'' + J' q'.
+Source: Siciliano et al. (2009), section 3.7: v = J q', a = J q'' + J' q'.
 """
 
 from __future__ import annotations

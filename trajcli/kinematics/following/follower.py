@@ -6,9 +6,9 @@ the joint values keep their components along the directions that are free at the
 s alone, the same forwards and backwards. A branch ends where the arm would change its aspect, the side of the
 singular configurations on which it is.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), sections
-3.5 and 3.7; Baillieul, Kinematic programming alternatives for redundant manipulators (ICRA 1985); for aspects
-Borrel and Liegeois, A study of multiple manipulator inverse kinematic solutions (ICRA 1986).
+Source: Siciliano et al. (2009), sections 3.5 and 3.7; Baillieul, Kinematic programming alternatives for
+redundant manipulators (ICRA 1985); for aspects Borrel and Liegeois, A study of multiple manipulator inverse
+kinematic solutions (ICRA 1986).
 """
 
 from __future__ import annotations

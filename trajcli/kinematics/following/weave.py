@@ -6,7 +6,7 @@ with the seam c, the amplitude a, a wave w of the phase f that begins and ends a
 across the seam. Where corners of the seam are rounded u follows quintics that join two derivatives of its
 direction, so that p has a continuous second derivative where c has one. |p'| is not 1: s is of the seam.
 
-Source: Farin, Curves and Surfaces for CAGD (2002), chapter 7 (quintic Hermite interpolation).
+Source: Farin (2002), chapter 7 (quintic Hermite interpolation).
 """
 
 from __future__ import annotations

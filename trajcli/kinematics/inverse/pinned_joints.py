@@ -4,8 +4,7 @@ Pinned joints at the beginning of the chain, such as a rail, move its base, thos
 rows of the others stay as they are, and so do their closed form and the names of its branches. Where one is
 pinned between others, the rows are made anew from the axes that are left.
 
-Source: Denavit and Hartenberg, A kinematic notation for lower-pair mechanisms based on matrices, Journal of
-Applied Mechanics (1955).
+Source: Denavit and Hartenberg (1955).
 """
 
 from __future__ import annotations

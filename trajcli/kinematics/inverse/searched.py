@@ -83,7 +83,6 @@ def by_held_joint(
 
 
 def _with_rows(answers: Answers, rows: NDArray[np.intp], others: Answers) -> Answers:
-    """Return the answers with those of some poses replaced."""
     most = max(answers.valid.shape[0], others.valid.shape[0])
     arrays = []
     for name in ("joints", "closure", "valid"):

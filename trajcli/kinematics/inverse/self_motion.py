@@ -12,8 +12,8 @@ the step follows from the last two (Barzilai and Borwein). Their distances need 
 arrive sooner than if they had to. A joint at its limit that would pass it is held. The result is the nearest
 of all around it, not of all there are.
 
-Source: Nocedal and Wright, Numerical Optimization (2006), section 16.7; Barzilai and Borwein, Two-point step
-size gradient methods, IMA J. Numerical Analysis 8 (1988).
+Source: Nocedal and Wright (2006), section 16.7; Barzilai and Borwein, Two-point step size gradient methods,
+IMA J. Numerical Analysis 8 (1988).
 """
 
 from __future__ import annotations

@@ -171,7 +171,6 @@ def check_reachable(robot: Robot, solutions: Solutions, *, turning_helps: bool =
 
 
 def _hint_for(solutions: Solutions, *, turning_helps: bool) -> str:
-    """Return what would make a pose reachable."""
     if solutions.fixed_axis is not None:
         return (
             f"no joint turns the {solutions.fixed_axis} axis of the tool: mean another one, with `tool_axis`"

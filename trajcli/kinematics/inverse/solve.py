@@ -84,7 +84,6 @@ def reached_if_turned(robot: Robot, target: IkTarget) -> bool:
 def _answers(
     robot: Robot, arm: AxisGeometry, target: IkTarget, near: Array | None, tolerance: float
 ) -> Answers:
-    """Return the answers of the method that fits the arm and the targets."""
     method = method_for(robot)
     if method.solve is not None and method.held is None and fits(method, target, robot.base):
         return _by_closed_form(robot, arm, method, target, near, tolerance)

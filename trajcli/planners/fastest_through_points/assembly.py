@@ -113,7 +113,6 @@ def _keeps_positions(problem: WaypointProblem, motion: PointMotion) -> bool:
 
 
 def _none_found(problem: WaypointProblem, names: list[str]) -> PlanningError:
-    """Return the error of points for which there is no motion, or none within the position limits."""
     free = replace(problem, position=np.tile([-np.inf, np.inf], (problem.joints, 1)))
     best = search(free, 1).best
     if problem.walled and np.isfinite(best.duration):
@@ -181,7 +180,6 @@ def _with_all_points(problem: WaypointProblem, kept: list[int], motion: PointMot
 
 
 def _between(curve: PiecewisePolynomial, start: float, end: float) -> PiecewisePolynomial:
-    """Return the pieces of a curve between two of its breaks."""
     middle = 0.5 * (curve.breaks[1:] + curve.breaks[:-1])
     inside = np.flatnonzero((middle > start) & (middle < end))
     first, last = int(inside[0]), int(inside[-1]) + 1

@@ -34,7 +34,6 @@ def shortest_duration(problem: WaypointProblem) -> tuple[float, int | None]:
 
 
 def _stretches(problem: WaypointProblem, joint: int) -> MonotoneStretches:
-    """Return the stretches of a joint between the points at which it turns."""
     turns = turning_points(problem.points[:, joint])
     steps = np.diff(turns, prepend=turns[0])
     ends = problem.states[[0, -1], joint]

@@ -4,8 +4,7 @@ The unknowns are those of each joint at each inner point (x), and those that all
 (s). A row sees one segment and one joint: x at both ends, and s. Eliminating s leaves a system for x that is
 block-tridiagonal by points, so that a step costs time in proportion to the number of segments.
 
-Source: Mehrotra, On the Implementation of a Primal-Dual Interior Point Method, SIAM J. Optimization 2 (1992);
-Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 14.
+Source: Mehrotra (1992); Nocedal and Wright (2006), chapter 14.
 """
 
 from __future__ import annotations
@@ -128,7 +127,6 @@ class _WholeNewton:
         self._matrix.flat[:: len(self._matrix) + 1] += programme.weight
 
     def solve(self, right: Array) -> Array:
-        """Return the solution for a right side."""
         programme = self._programme
         inner = np.asarray(np.linalg.solve(self._matrix, programme.inner(right)), dtype=np.float64)
         return programme.with_ends(inner)
@@ -169,7 +167,6 @@ class _Newton:
         self._points = cyclic_factors(diagonal, across[1:-1])
 
     def solve(self, right: Array) -> Array:
-        """Return the solution for a right side."""
         programme = self._programme
         segments, joints = self._sizes
         x, s = programme.split(right)

@@ -3,8 +3,7 @@
 Ruckig takes many joints at once, each by itself where none waits for another: all states of a list, and all
 that differences need, cost one call.
 
-Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
-(RSS 2021).
+Source: Berscheid and Kroeger (2021).
 """
 
 from __future__ import annotations

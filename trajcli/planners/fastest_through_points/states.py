@@ -4,7 +4,7 @@ Each segment is the fastest motion between the states at its ends, so that limit
 duration is that of its slowest joint, or of what all joints can last together. The sum is lowered by a
 sequence of linear programmes within a trust region.
 
-Source: Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapters 4 and 18.
+Source: Nocedal and Wright (2006), chapters 4 and 18.
 """
 
 from __future__ import annotations

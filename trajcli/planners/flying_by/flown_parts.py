@@ -183,7 +183,6 @@ def along_path(course: Course, stretch: tuple[float, float], states: Array, temp
 
 
 def _between(curve: PiecewisePolynomial, low: float, high: float) -> PiecewisePolynomial:
-    """Return the part of a curve from one s to another."""
     if low > curve.start:
         curve = cut(curve, low)[1]
     return cut(curve, high)[0] if high < curve.end else curve
@@ -191,7 +190,6 @@ def _between(curve: PiecewisePolynomial, low: float, high: float) -> PiecewisePo
 
 @contextmanager
 def _no_law(course: int) -> Iterator[None]:
-    """Say which course has no law."""
     try:
         yield
     except (UnreachableSpeedError, UnsettledSpeedError) as error:
@@ -264,7 +262,6 @@ def _hardly_moves(problem: BoundaryProblem) -> bool:
 
 
 def _quintic(problem: BoundaryProblem, duration: float) -> PiecewisePolynomial:
-    """Return the quintic between the states of a joint."""
     start, end = (np.array(state)[:, None, None] for state in (problem.initial, problem.final))
     coefficients = hermite_coefficients(start, end, np.array([[duration]]))
     return PiecewisePolynomial(np.array([0.0, duration]), coefficients)

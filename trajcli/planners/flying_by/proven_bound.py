@@ -133,7 +133,6 @@ class _Variable:
 
     @property
     def width(self) -> int:
-        """How many columns it takes."""
         return 3 * (self.intervals + 1)
 
     def node(self, border: int) -> int:

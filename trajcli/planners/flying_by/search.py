@@ -5,8 +5,8 @@ of a path, on which one variable is fastest, or a zone, through which each joint
 a grid of states at every node finds the basin; grids around the best chain, turned from round to round, and
 smaller where they gain nothing, lead to its ground. Each is exact among its states, and no round is slower.
 
-Source: Bellman, Dynamic Programming (1957); Torczon, On the convergence of pattern search algorithms, SIAM
-Journal on Optimization 7(1), 1997.
+Source: Bellman (1957); Torczon, On the convergence of pattern search algorithms, SIAM Journal on Optimization
+7(1), 1997.
 """
 
 from __future__ import annotations
@@ -275,7 +275,6 @@ def _slowest_first(zone: ZoneStates | None) -> NDArray[np.int_]:
 
 
 def _lasts(pairs: Sequence[tuple[Array, Array, ChainPart]], chosen: Sequence[int]) -> float:
-    """Return the duration of the chain of chosen states."""
     total = 0.0
     for (before, after, part), i, j in zip(pairs, chosen, chosen[1:], strict=False):
         if isinstance(part, PathPart):

@@ -8,9 +8,7 @@ part lasts at least for speeds anywhere in two of them is added up. Chains that 
 that is known are left out, the other intervals are halved. All motions obey these relations, so that the
 bound holds whatever the search does. Next to stops limits of jerk count, too.
 
-Source: Bobrow, Dubowsky and Gibson, Time-optimal control of robotic manipulators along specified paths,
-International Journal of Robotics Research 4(3) (1985), for speeds
-over s; Bellman, Dynamic Programming (1957).
+Source: Bobrow, Dubowsky and Gibson (1985), for speeds over s; Bellman (1957).
 """
 
 from __future__ import annotations

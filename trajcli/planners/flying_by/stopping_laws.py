@@ -5,8 +5,7 @@ part of its own, and a motion through every zone: a chain with these states is n
 Between them and faster states squares of speeds, and accelerations, are mixed: the mixture of two laws that
 keep limits of velocity and acceleration keeps them, too.
 
-Source: Verscheure, Demeulenaere, Swevers, De Schutter and Diehl, Time-Optimal Path Tracking for Robots: A
-Convex Optimization Approach, IEEE Transactions on Automatic Control 54(10), 2009.
+Source: Verscheure et al. (2009).
 """
 
 from __future__ import annotations
@@ -153,7 +152,6 @@ class StoppingLaws:
 
 
 def _law_of(part: FlownPart) -> PiecewisePolynomial:
-    """Return the law of a motion along a course."""
     if part.law is None:
         raise TypeError("a motion along a course has a law")
     return part.law

@@ -134,7 +134,6 @@ def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequenc
 
 
 def _has_length(move: PlannedMove) -> bool:
-    """Return whether a move goes anywhere."""
     return move.planned.curve.duration > 0
 
 

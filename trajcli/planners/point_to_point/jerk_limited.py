@@ -1,7 +1,6 @@
 """Jerk-limited motions of all joints: each by itself, all together in time, or all on one line.
 
-Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
-(RSS 2021).
+Source: Berscheid and Kroeger (2021).
 """
 
 from __future__ import annotations
@@ -217,7 +216,6 @@ def _orders_outside(boundary: BoundaryProblem) -> list[int]:
 
 
 def _braking_event(planned: Planned, boundary: BoundaryProblem, joint: int, order: int) -> Event:
-    """Return the event of a start outside a limit."""
     value, (low, high) = boundary.initial[order], boundary.bounds[order - 1].tolist()
     if low <= value <= high:
         value, what = braking(*boundary.initial[1:], boundary.bounds).fastest, "cannot but reach"
@@ -481,7 +479,6 @@ def _beyond(state: tuple[float, float, float], sign: int, bounds: Array) -> floa
 
 
 def _leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningError:
-    """Return the error of a boundary velocity or acceleration that points away from the straight line."""
     name = robot.joint_names[joint]
     message = "`synchronize: phase` keeps all joints on one straight line, "
     message += f"but {QUANTITIES[order]} {{value}} of {{joint}} leaves it"

@@ -1,7 +1,6 @@
 """Cubic, quintic and septic polynomials between two boundary states, and their shortest duration.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1; Biagiotti and
-Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 2.1.
+Source: Siciliano et al. (2009), section 4.2.1; Biagiotti and Melchiorri (2008), section 2.1.
 """
 
 from __future__ import annotations

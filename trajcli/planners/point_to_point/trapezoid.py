@@ -1,6 +1,6 @@
 """Trapezoidal velocity: one law for all joints, or one for each.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.1.
+Source: Siciliano et al. (2009), section 4.2.1.
 """
 
 from __future__ import annotations

@@ -32,8 +32,7 @@ class PhasesInPeriods:
     on either side, and the rest at its velocity. With m = n_j + n_a it is v = d / (h (N - n_j - m)), the
     acceleration v / (h m), and the jerk that over h n_j. With n_j = 0 there is no jerk.
 
-    Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section
-    3.4, for given lengths of the phases.
+    Source: Biagiotti and Melchiorri (2008), section 3.4, for given lengths of the phases.
     """
 
     def __init__(self, period: float, *, smooth: bool) -> None:

@@ -1,6 +1,6 @@
 """Circular arcs and helices of the tool.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.1.
+Source: Siciliano et al. (2009), section 4.3.1.
 """
 
 from __future__ import annotations

@@ -2,8 +2,7 @@
 
 A law goes from rest to rest over each segment of the path between two stops.
 
-Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapters 2
-and 3.
+Source: Biagiotti and Melchiorri (2008), chapters 2 and 3.
 """
 
 from __future__ import annotations
@@ -412,7 +411,6 @@ def _bounds(spec: LawSpec, limits: ToolLimits, derivatives: PathDerivatives) -> 
 
 
 def _rotation_bounds(spec: LawSpec, limits: ToolLimits, derivatives: PathDerivatives) -> PathBounds:
-    """Return the bounds that the rotation of the tool sets."""
     if derivatives.turning == 0:
         return PathBounds(math.inf, math.inf, math.inf, math.inf)
     speed = _or(spec.angular_speed, limits.angular_speed) / derivatives.turning

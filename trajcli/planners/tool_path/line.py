@@ -1,7 +1,6 @@
 """Straight lines, pure rotations, and screw motions of the tool.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3; Lynch and Park,
-Modern Robotics (2017), section 9.2.1.
+Source: Siciliano et al. (2009), section 4.3; Lynch and Park (2017), section 9.2.1.
 """
 
 from __future__ import annotations
@@ -95,6 +94,5 @@ class ScrewMove(ToolPathMove):
 
 
 def _path_of_no_length(before: Array, target: ToolTarget, to: Target) -> PlannedPath:
-    """Return the path to a target that is where the tool is."""
     poses = PoseCurve(Pivot(before[:3, 3], target.pose[:3, 3], 0.0), FixedOrientation(before[:3, :3], 0.0))
     return path_of_poses(poses, target, to)

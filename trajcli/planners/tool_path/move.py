@@ -1,6 +1,6 @@
 """Moves of the tool along a path: what a target fixes, how the orientation changes, how the arm follows.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.
+Source: Siciliano et al. (2009), section 4.3.
 """
 
 from __future__ import annotations
@@ -244,7 +244,6 @@ class ToolPathMove(Planner):
         )
 
     def _followed(self, planned: PlannedPath, start: Array, robot: Robot) -> JointMotion:
-        """Return the motion along the path from joint values `start` (n,), under the law."""
         path, tolerance = planned.path, self.tolerance.tolerance
         if planned.overlap is not None:
             return JointMotion(followed_in_time(robot, planned.overlap, start), planned.overlap)

@@ -4,7 +4,7 @@ The position is p0 + sum_i (c_i(s_i(t)) - c_i(0)), the textbook's formula for an
 orientation R0 prod_i exp(f_i(t) v_i) with the rotation vectors v_i of the segments and the part f_i of each
 that is done.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.3.2, eq. 4.43.
+Source: Siciliano et al. (2009), section 4.3.2, eq. 4.43.
 """
 
 from __future__ import annotations

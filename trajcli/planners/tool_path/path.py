@@ -86,7 +86,6 @@ class PathMove(WovenMove):
 
     @property
     def _count(self) -> int:
-        """How many segments there are."""
         given = self.segments
         return len(given.positions) if isinstance(given, RecordedPoses) else len(given)
 
@@ -215,7 +214,6 @@ def _jump(s: float) -> PlanningError:
 
 
 def _radius_events(chain: Chain) -> tuple[Event, ...]:
-    """Return an event for each corner whose radius was shrunk."""
     shrunk = [
         (number, corner)
         for number, corner in enumerate(chain.corners, 1)
@@ -238,5 +236,4 @@ def _shrunk(number: int, corner: Corner) -> Event:
 
 
 def _end_of(segment: Segment) -> Target | None:
-    """Return where a segment ends; None for an arc of an angle."""
     return segment.line if segment.arc is None else segment.arc.to

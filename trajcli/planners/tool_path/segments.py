@@ -189,7 +189,6 @@ def line_to(poses: RecordedPoses, index: int) -> Segment:
 
 
 def _lines_to(poses: RecordedPoses) -> list[Segment]:
-    """Return a line to each of some poses."""
     return [line_to(poses, index) for index in range(len(poses.positions))]
 
 

@@ -1,7 +1,6 @@
 """Time-optimal law along a path of the tool, under the limits of joints and tool.
 
-Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis,
-IEEE Trans. Robotics 34 (2018).
+Source: Pham and Pham (2018).
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Linear segments with parabolic blends, and their times and durations where only the limits say so.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Craig,
-Introduction to Robotics (2005), section 7.3.
+Source: Siciliano et al. (2009), section 4.2.2; Craig (2005), section 7.3.
 """
 
 from __future__ import annotations
@@ -109,7 +108,6 @@ class _Family:
         return np.asarray((self.share or 1.0) * np.minimum(padded[:-1], padded[1:]))
 
     def curve(self, segments: Array) -> PiecewisePolynomial:
-        """Return the curve."""
         times = np.concatenate([[0.0], np.cumsum(segments)])
         blends = self.blends(segments)
         return blended(times, self.positions, blends, ends=self.ends, exactly=self.exactly).curve

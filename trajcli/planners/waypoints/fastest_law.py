@@ -144,7 +144,6 @@ def solve_second_order(path: JointPath, robot: Robot, *, of_tool: bool) -> TimeO
 
 
 def _require_along(across: Array, acceleration: Array, robot: Robot) -> None:
-    """Refuse a start whose acceleration leaves the path."""
     off = np.abs(across)
     if off.max() <= _OFF * np.abs(acceleration).max():
         return

@@ -1,7 +1,6 @@
 """Splines through waypoints, at times that are given or that the limits allow.
 
-Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2; Biagiotti and
-Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), chapter 4.
+Source: Siciliano et al. (2009), section 4.2.2; Biagiotti and Melchiorri (2008), chapter 4.
 """
 
 from __future__ import annotations

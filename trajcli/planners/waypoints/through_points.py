@@ -298,7 +298,6 @@ class ThroughPoints(PointSequence):
 
 
 def _placed(point: Waypoint, resolved: Target) -> Waypoint:
-    """Return the point with the joints that reach it."""
     if not point.gives_pose:
         return point
     return Waypoint(**resolved.model_dump(by_alias=True), time=point.time, blend=point.blend)

@@ -1,7 +1,6 @@
 """Time-optimal motion through waypoints: a path in joint space, and the fastest law along it.
 
-Source: Pham and Pham, A New Approach to Time-Optimal Path Parameterization Based on Reachability Analysis,
-IEEE Trans. Robotics 34 (2018).
+Source: Pham and Pham (2018).
 """
 
 from __future__ import annotations
@@ -259,7 +258,6 @@ class TimeOptimal(ThroughPoints):
     def _solved(
         self, points: PointTable, robot: Robot, moving: NDArray[np.bool_], *, of_tool: bool
     ) -> tuple[JointPath, TimeOptimalMotion]:
-        """Return the path and the fastest motion along it."""
         if not self._keeps_jerk(robot) or not np.isfinite(robot.limits.jerk[moving]).any():
             path = self._path(points, robot, smooth=False)
             return path, solve_second_order(path, robot, of_tool=of_tool)

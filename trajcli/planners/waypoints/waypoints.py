@@ -1,7 +1,6 @@
 """Jerk-limited motion through waypoints, with free geometry between them.
 
-Source: Berscheid and Kroeger, Jerk-limited Real-time Trajectory Generation with Arbitrary Target States
-(RSS 2021); Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 18.
+Source: Berscheid and Kroeger (2021); Nocedal and Wright (2006), chapter 18.
 """
 
 from __future__ import annotations

@@ -249,7 +249,6 @@ class _Frame:
         self._turn, self.p = _NO_TURN, ZERO
 
     def move(self, turn: Turn, distance: Entry) -> None:
-        """Turn about z and slide along it."""
         self._turn = added(self._turn, turn)
         self.p = advance(self.p, product(self.flip_z, distance), self.z)
 
@@ -269,7 +268,6 @@ class _Frame:
         self.z, self.flip_z = combine(cosine * out, z, -sine * up, y), 1.0
 
     def slide(self, a: float, b: float, c: float) -> None:
-        """Slide along the three axes."""
         p = self.p
         if a != 0.0:
             p = advance(p, a, self.x)
@@ -279,7 +277,6 @@ class _Frame:
 
     @property
     def x(self) -> VectorEntries:
-        """First axis."""
         cosine, sine = self._turn
         join = combine if self._flip_y > 0.0 else uncombine
         return join(cosine, self._x, sine, self._y)
@@ -305,7 +302,6 @@ def _weighted(weights: Sequence[float], axes: Sequence[VectorEntries]) -> Vector
 
 
 def _square(a: VectorEntries, b: VectorEntries) -> Array:
-    """Return |a - b|^2."""
     first, second, third = (np.asarray(x - y) for x, y in zip(a, b, strict=True))
     for entry in (first, second, third):
         np.square(entry, out=entry)

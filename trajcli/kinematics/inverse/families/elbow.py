@@ -12,8 +12,7 @@ the first angle, the shoulder facing the target or turned away from it; with the
 "Left" faces the side where axis 2 lies, seen from axis 1; where they meet, that of the first link's x axis.
 "Up" has the elbow above the line from shoulder to point, along axis 1: it is the higher one.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-2.12.4, here without assuming right angles or lengths.
+Source: Siciliano et al. (2009), section 2.12.4, here without assuming right angles or lengths.
 """
 
 from __future__ import annotations

@@ -12,8 +12,7 @@ chain. The angle of the tool about k is the sum of the turns.
 "Up" has the elbow on the left of the line from shoulder to point, seen against k of the first turn; of a
 slide it is the longer one.
 
-Source: Siciliano, Sciavicco, Villani and Oriolo, Robotics: Modelling, Planning and Control (2009), section
-2.12.1; Craig, Introduction to Robotics (2005), chapter 4.
+Source: Siciliano et al. (2009), section 2.12.1; Craig (2005), chapter 4.
 """
 
 from __future__ import annotations

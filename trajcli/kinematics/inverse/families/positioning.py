@@ -27,8 +27,7 @@ turns as (cosine, sine). Two solutions come along a new first axis.
 An arm of three joints has the solutions of its structure; its orientation follows, and a target that fixes it
 is met only if it agrees.
 
-Source: Spong, Hutchinson and Vidyasagar, Robot Modeling and Control (2006), section 3.3; Pieper, The
-Kinematics of Manipulators under Computer Control (1968).
+Source: Spong, Hutchinson and Vidyasagar, Robot Modeling and Control (2006), section 3.3; Pieper (1968).
 """
 
 from __future__ import annotations
@@ -178,7 +177,6 @@ def ball(
 
 
 def _plus_square(value: Entry, root: Entry) -> Array:
-    """Return value + root^2."""
     return np.asarray(value + np.square(root))
 
 

@@ -4,7 +4,7 @@ exp(S1 q1) ... exp(Sn qn) H is the pose of the tcp, H the pose at zero and S_i t
 Conventions, offsets and signs of the DH table are all in the axes, so that what is parallel or meets is the
 same in every table of the same arm.
 
-Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 3.2.
+Source: Murray, Li and Sastry (1994), section 3.2.
 """
 
 from __future__ import annotations

@@ -12,9 +12,7 @@ only the sum (or difference) of their turns is fixed: the first is zero then, th
 
 An arm whose first three axes meet is the same read from the tool to the base.
 
-Source: Pieper, The Kinematics of Manipulators under Computer Control (1968); Murray, Li and Sastry, A
-Mathematical Introduction to Robotic Manipulation (1994), section 3.3.2; Siciliano, Sciavicco, Villani and
-Oriolo, Robotics: Modelling, Planning and Control (2009), section 2.12.5.
+Source: Pieper (1968); Murray, Li and Sastry (1994), section 3.3.2; Siciliano et al. (2009), section 2.12.5.
 """
 
 from __future__ import annotations
@@ -106,7 +104,6 @@ def _distance(aim: VectorEntries, axis: Floats, bend: Turn | Opposed) -> Array:
 
 
 def _replaced(value: Turn | Mirrored, where: Flags, turn: Turn) -> Turn | Mirrored:
-    """Return a value with another turn where `where` holds."""
     old = value.turn if isinstance(value, Mirrored) else value
     new = np.where(where, turn[0], old[0]), np.where(where, turn[1], old[1])
     return Mirrored(new) if isinstance(value, Mirrored) else new
@@ -203,7 +200,6 @@ def _backwards(solver: SphericalWrist, goal: Displacement, flags: DegeneracyFlag
 
 
 def _back(turns: Sequence[tuple[Floats, Turn]], vector: VectorEntries) -> VectorEntries:
-    """Return a direction as it was before the turns."""
     for axis, turn in turns:
         vector = turned_back(vector, axis, turn)
     return vector

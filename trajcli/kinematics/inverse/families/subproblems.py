@@ -5,8 +5,8 @@ trigonometric function is called. Where a subproblem has two solutions they come
 length two; everything after it broadcasts. An aim out of reach is replaced by the nearest one that can be
 reached: forward kinematics then says by how much the target is missed.
 
-Source: Paden, Kinematics and Control of Robot Manipulators (1986); Murray, Li and Sastry, A Mathematical
-Introduction to Robotic Manipulation (1994), section 3.3.2.
+Source: Paden, Kinematics and Control of Robot Manipulators (1986); Murray, Li and Sastry (1994), section
+3.3.2.
 """
 
 from __future__ import annotations

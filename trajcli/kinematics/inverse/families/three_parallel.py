@@ -15,7 +15,7 @@ angles about that direction are fixed. A 4R or 5R arm meets a pose only if it ca
 orientation; the residual says by how much it cannot.
 
 Source: Hawkins, Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms (2013), here from screw
-axes instead of lengths; Siciliano, Sciavicco, Villani and Oriolo, Robotics (2009), section 2.12.
+axes instead of lengths; Siciliano et al. (2009), section 2.12.
 """
 
 from __future__ import annotations

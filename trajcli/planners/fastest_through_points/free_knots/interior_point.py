@@ -5,7 +5,7 @@ with the second derivatives of the Lagrangian, whose curvature by durations is m
 misses of the points, because durations and accelerations are multiplied, is put right before its gain is
 judged.
 
-Source: Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapter 19.
+Source: Nocedal and Wright (2006), chapter 19.
 """
 
 from __future__ import annotations
@@ -89,7 +89,6 @@ def _least_jerk(problem: KnotProblem, times: Array, ends: Array) -> KnotMotion:
 
 
 def _moved(problem: KnotProblem, motion: KnotMotion, change: Change, part: float) -> KnotMotion:
-    """Return the motion after a part of a change."""
     bend = problem.bend[:, None]
     ends = motion.ends + part * change.ends * np.concatenate([np.ones_like(bend), bend], axis=1)
     return KnotMotion(motion.lengths + part * change.lengths, ends, motion.bends + part * bend * change.bends)
@@ -120,7 +119,6 @@ class _Slacks:
     time: Array
 
     def along(self, change: _Slacks, part: float) -> _Slacks:
-        """Return these after a part of a change."""
         return _Slacks(self.room + part * change.room, self.time + part * change.time)
 
     def share(self, changes: _Slacks) -> float:
@@ -245,7 +243,6 @@ class _Iterate:
             self._product = max(_GOAL * duration / self._count, _NEXT * self._product)
 
     def _slope(self, dual: Array, dual_lengths: Array) -> float:
-        """Return the largest slope of the Lagrangian."""
         count = dual_lengths.shape[1]
         own, ends = dual[..., : count - 1], np.zeros(self._problem.free.shape)
         ends[:-1] += dual[..., count - 1 : count + 1]

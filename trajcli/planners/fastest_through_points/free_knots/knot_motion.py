@@ -9,7 +9,7 @@ itself are its accelerations a at the knots, between which they are straight, an
 Limits of acceleration and jerk are linear in these unknowns. Between knots the velocity is a parabola, whose
 middle Bezier point v_(i-1) + h_i a_(i-1) / 2 keeps its bounds.
 
-Source: Farin, Curves and Surfaces for CAGD (2002), chapter 5.
+Source: Farin (2002), chapter 5.
 """
 
 from __future__ import annotations

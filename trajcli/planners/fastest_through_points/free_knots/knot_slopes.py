@@ -4,7 +4,7 @@ Of the system the unknowns of each segment and joint are eliminated first, then 
 what is left, velocities and accelerations at points, is block-tridiagonal, so that a step costs time in
 proportion to the number of segments.
 
-Source: Nocedal and Wright, Numerical Optimization, 2nd edition (2006), chapters 16 and 19.
+Source: Nocedal and Wright (2006), chapters 16 and 19.
 """
 
 from __future__ import annotations
