@@ -331,3 +331,48 @@ def test_what_a_profile_cannot_judge_is_said(tmp_path: Path) -> None:
     found = beside_arm(tmp_path, "t,q1,qd1\n0,0,0\n1,0,0\n", profile="ros-jtc")
     assert any("jtc-first-point is not judged" in note for note in found.notes)
     assert not beside_arm(tmp_path, "t,q1,qd1\n0,0,0\n1,0,0\n").notes
+
+
+@pytest.mark.parametrize("option", ["job", "robot"])
+def test_columns_without_units_have_those_that_the_job_or_the_robot_states(
+    option: str, tmp_path: Path
+) -> None:
+    """Half a degree below the limit, and above it: in radians both would be far beyond; a note says what was taken."""
+    robot = "{joints: [{type: revolute, position: [-60, 60]}]}"
+    text = f"""\
+version: 1
+units: {{angle: deg}}
+robot: {robot}
+limits: {{velocity: 1000, acceleration: 100000, jerk: null}}
+start: {{joints: [30]}}
+moves: [{{planner: quintic, to: {{joints: [40]}}, duration: 1}}]
+"""
+    if option == "robot":
+        text = "units: {angle: deg}\njoints: [{type: revolute, position: [-60, 60]}]\n"
+    (tmp_path / "said.yaml").write_text(text)
+    for top in (59.5, 60.5):
+        degrees = 30 + (top - 30) * np.sin(np.linspace(0, np.pi / 2, 61))
+        lines = [f"{0.05 * k:.2f},{value:.6f}" for k, value in enumerate(degrees)]
+        (tmp_path / "rows.csv").write_text("\n".join(["time,joint1", *lines]) + "\n")
+        asked = CheckOptions(**{option: str(tmp_path / "said.yaml")})
+        judgement = check_file(str(tmp_path / "rows.csv"), asked).judgement
+        found = [each.value for each in judgement.findings if each.kind in ("position", "start")]
+        assert found == ([] if top < 60 else [pytest.approx(np.radians(top), abs=1e-6)])
+        assert any("deg" in note for note in judgement.notes)
+
+
+def test_a_spline_through_all_rows_is_one_whatever_is_read_at_a_time(tmp_path, monkeypatch) -> None:
+    """It is at rest at both ends alone: where a block of rows ends it keeps its velocity of 1 rad/s."""
+    monkeypatch.setattr(file_module, "JUDGED_ROWS", 100)
+    t = 0.01 * np.arange(601)
+    ramp = np.minimum(np.minimum(t, 6.0 - t), 0.5)
+    way = ramp / 2 - np.sin(2 * np.pi * ramp) / (4 * np.pi)  # of a velocity of sin^2(pi t)
+    q = np.where(t < 3, way + np.clip(t - 0.5, 0, None), 5.5 - way - np.clip(5.5 - t, 0, None))
+    job = ONE_MOVE.replace("PLANNER", "quintic").replace("END", "0.5").replace("ACCELERATION", "20")
+    for limit, over in ((1.001, False), (0.999, True)):
+        said = job.replace("velocity: 9", f"velocity: {limit}")
+        rows = np.stack([t, q, np.full_like(t, 0.5)], axis=1)
+        findings = judged(tmp_path, said, rows, "t,q1,q2", interpolate="jtc-upsampling").findings
+        assert [each.kind for each in findings if each.kind in ("velocity", "acceleration")] == [
+            "velocity"
+        ] * over
