@@ -201,3 +201,22 @@ def test_each_interval_is_told_alone(piece, side):
     slack = 80.0 - side * MASS * G
     wanted = np.where(np.arange(3) == piece, 2 * MASS * 4.0 / slack, 0.0)  # both slides lift the mass
     np.testing.assert_allclose(shares, wanted, atol=1e-9)
+
+
+def test_shares_are_those_of_efforts_at_both_ends_and_in_the_middle():
+    """Gravity of an arm changes on the way; what it takes at the near end counts as not there to be used."""
+    robot, times, worst = random_arm(np.random.default_rng(3), 3), np.array([0.0, 0.2, 0.4]), set()
+    dynamics, path = InverseDynamics(robot), curved(3, 3)
+    for joint, sdd in np.ndindex(3, 5):
+        limits = np.tile([-FREE, FREE], (3, 1))
+        limits[joint, 1] = 1e4
+        law = np.array([[sdd - 2.0], [1.0], [0.1]])
+        s, sd = np.polyval(law[:, 0], times), 1.0 + 2.0 * law[0] * times
+        q, first, second = path.evaluate_orders(s, (0, 1, 2)).transpose(1, 0, 2)
+        efforts = dynamics.effort(q, first * sd[:, None], first * 2.0 * law[0] + second * sd[:, None] ** 2)
+        gravity = dynamics.gravity_effort(q[0])[joint]
+        shares = (efforts[:, joint] - gravity) / (1e4 - gravity)
+        worst.add(int(shares.argmax()))
+        found = constraint(robot, path, limits).excess(LawPieces(np.array([0.4]), law))
+        np.testing.assert_allclose(found[1], max(shares.max(), 0.0), rtol=1e-9, atol=1e-12)
+    assert worst == {0, 1, 2}

@@ -55,21 +55,20 @@ class _PathDynamics:
     def at(self, s: Array, q: Array, first: Array, second: Array) -> list[Array]:
         """Return M q', M q'' + C q' and g at points (p,), each (p, n)."""
         states = np.concatenate([q, first, second], axis=1)
-        index = np.clip(np.searchsorted(self._s, s), 0, max(self._s.size - 1, 0))
-        new = np.ones(s.size, dtype=bool)
-        if self._s.size:
-            apart = np.abs(self._states[index] - states) <= _SAME * np.abs(states).max(axis=0, initial=0.0)
-            new = ~((self._s[index] == s) & apart.all(axis=1))
-        values = np.empty_like(states)
-        values[~new] = self._values[index[~new]]
-        if new.any():
-            values[new] = np.concatenate(self._dynamics.along_path(q[new], first[new], second[new]), axis=1)
-            every = np.concatenate([s, self._s])
-            order = np.argsort(every, kind="stable")  # of one point the newest comes first
-            order = order[np.append(True, np.diff(every[order]) > 0)]
+        near, apart = np.searchsorted(self._s, s), _SAME * np.abs(states).max(axis=0, initial=0.0)
+        values, new = np.empty_like(states), np.arange(s.size)
+        for beside in (0, 1, -1) if self._s.size else ():  # of a break there are two states
+            index = np.clip(near[new] + beside, 0, self._s.size - 1)
+            same = (np.abs(self._states[index] - states[new]) <= apart).all(axis=1)
+            values[new[same]], new = self._values[index[same]], new[~same]
+        if new.size:
+            found = self._dynamics.along_path(q[new], first[new], second[new])
+            values[new] = np.concatenate(found, axis=1)
+            every = np.concatenate([s[new], self._s])
+            order = np.argsort(every, kind="stable")
             self._s = every[order]
-            self._states = np.concatenate([states, self._states])[order]
-            self._values = np.concatenate([values, self._values])[order]
+            self._states = np.concatenate([states[new], self._states])[order]
+            self._values = np.concatenate([values[new], self._values])[order]
         return np.split(values, 3, axis=1)
 
 
@@ -141,14 +140,14 @@ class EffortConstraint:
 
     def excess(self, law: LawPieces) -> Array:
         """Return zeros for velocity, and the shares used of what gravity leaves, at samples, (2, N)."""
-        q = law.along(self.path).transpose(0, 2, 1)[:, None]
-        times = np.array(_SAMPLES)[:, None, None] * law.durations[:, None]
-        position, rate, change = (horner(derivative_coefficients(q, order), times) for order in range(3))
-        begins = law.coefficients[-1]
-        states = self.path.evaluate_orders(begins, (0, 1, 2), side="right").transpose(1, 0, 2)
-        # where the limit is met the share is 1 whatever gravity is taken to be: that of the near end is known
-        gravity = self._path_dynamics.at(begins, *states)[2]
-        moving = self.dynamics.rigid_effort(position, rate, change) - gravity + self._viscous * rate
+        times = np.array(_SAMPLES)[:, None] * law.durations
+        s, speed, change = (horner(derivative_coefficients(law.coefficients, k), times) for k in range(3))
+        piece = np.clip(np.searchsorted(self.path.breaks, s[0], "right") - 1, 0, self.path.pieces - 1)
+        local, spoken = (s - self.path.breaks[piece])[..., None], self.path.coefficients[:, piece]
+        states = np.stack([horner(derivative_coefficients(spoken, k), local) for k in range(3)])
+        rate = states[1] * speed[..., None]
+        moving, gravity = self._moving(s, states, speed[..., None], change[..., None])
+        moving += self._viscous * rate
         slacks = self._slacks(
             gravity + self._coulomb * direction(rate[1])
         )  # at rest at an end it is that of the motion
@@ -157,6 +156,21 @@ class EffortConstraint:
             shares = np.where(slacks > 0, used / slacks, np.where(used > slacks, _MOST, 0.0))
         worst = np.clip(shares.max(axis=(0, 2), initial=0.0), 0.0, _MOST)
         return np.stack([np.zeros_like(worst), worst])
+
+    def _moving(self, s: Array, states: Array, speed: Array, change: Array) -> tuple[Array, Array]:
+        """Return efforts without friction, less gravity at the near ends, (samples, N, n), and that, (N, n).
+
+        Where the limit is met its share is 1 whatever gravity is taken to be: that of the near end is known,
+        and so is what makes the efforts at both ends, where grid points are.
+        """
+        (q, first, second), ends = states, [0, -1]
+        near = states[:, ends].reshape(3, -1, q.shape[2])
+        a, b, held = np.reshape(self._path_dynamics.at(s[ends].reshape(-1), *near), (3, 2, *q.shape[1:]))
+        moving = self.dynamics.rigid_effort(
+            q[1:-1], first[1:-1] * speed[1:-1], first[1:-1] * change[1:-1] + second[1:-1] * speed[1:-1] ** 2
+        )
+        begin, end = a * change[ends] + b * speed[ends] ** 2 + held
+        return np.concatenate([begin[None], moving, end[None]]) - held[0], held[0]
 
     @property
     def _bounded(self) -> tuple[Array, Array]:

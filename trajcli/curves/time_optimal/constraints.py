@@ -159,19 +159,17 @@ class JointConstraint:
 
     def _excess(self, q: Array, durations: Array) -> Array:
         """Return the excess (2, w) of polynomials q(t) (d + 1, n, w) that last (w,)."""
-        acceleration = _used(control_points(derivative_coefficients(q, 2), durations), self.acceleration)
+        points = control_points(derivative_coefficients(q, 2), durations)
         qd = derivative_coefficients(q, 1)
         velocity = _used(np.stack([qd[-1], horner(qd, durations)]), self.velocity)
-        slowest = np.abs(self.velocity).min(axis=1)
-        with np.errstate(invalid="ignore"):
-            steepest = np.abs(self.acceleration).max(axis=1) / slowest
-            steepest = np.where(np.isfinite(slowest), steepest, 0.0).max()
-            upper_bound = velocity + 0.5 * acceleration * steepest * durations
+        slowest = np.abs(self.velocity).min(axis=1, keepdims=True)
+        steepest = (np.abs(points).max(axis=0) / slowest).max(axis=0)
+        upper_bound = velocity + 0.5 * steepest * durations
         fast = np.flatnonzero(
             ~(upper_bound <= 1.0)
         )  # elsewhere the ends and the acceleration bound the velocity
         velocity[fast] = _used(control_points(qd[:, :, fast], durations[fast]), self.velocity)
-        return np.stack([velocity, acceleration])
+        return np.stack([velocity, _used(points, self.acceleration)])
 
 
 @frozen

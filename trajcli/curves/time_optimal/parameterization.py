@@ -8,7 +8,6 @@ the problem is solved again. What is left after that is taken away by slowing do
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -288,12 +287,15 @@ class GridSolution:
         changed = (rows.C != old.C).any(axis=0) | lower[1:] | lower[:-1]
         mvc = maximum_velocity_curve(rows, self.speeds.mvc, changed)
         speeds = solve_locally(rows, self.speeds, changed, mvc) if changed.mean() < _FEW_CHANGED else None
-        before = replace(self, even=self.even | even)
-        return _judged(problem, rows, speeds or solve(rows, *problem.ends, mvc), before)
+        return _judged(problem, rows, speeds or solve(rows, *problem.ends, mvc), self.even | even, self)
 
 
 def _judged(
-    problem: PathProblem, rows: IntervalRows, speeds: Speeds, before: GridSolution | None = None
+    problem: PathProblem,
+    rows: IntervalRows,
+    speeds: Speeds,
+    even: NDArray[np.bool_],
+    before: GridSolution | None,
 ) -> GridSolution:
     """Return the solution with its law and the excess of that; where it is wild, sdd is constant.
 
@@ -301,42 +303,47 @@ def _judged(
         problem: What it solves.
         rows: That it obeys.
         speeds: sd^2 at its grid points.
-        before: A solution on the same grid.
+        even: In which intervals sdd is constant, shape (N,).
+        before: A solution of the same problem: what pieces of its law exceed is known.
     """
-    even = np.zeros(rows.grid.size - 1, dtype=bool) if before is None else before.even
     while True:
         pieces = law_pieces(rows.grid, speeds.x, *end_accelerations(rows, speeds.x, speeds.mvc, even))
-        if before is None:
-            excess = problem.excess(pieces)
-        else:
-            excess, chosen = before.excess.copy(), np.flatnonzero(pieces.differ(before.pieces))
-            if chosen.size:
-                excess[:, :, chosen] = problem.excess(pieces.chosen(chosen))
-        before = GridSolution(problem, rows, speeds, pieces, excess, even)
-        wild = (excess.max(axis=(0, 1)) > _WILD) & ~even
+        before = GridSolution(problem, rows, speeds, pieces, _excess(problem, pieces, before), even)
+        wild = (before.excess.max(axis=(0, 1)) > _WILD) & ~even
         if not wild.any():
             return before
         even = even | wild
 
 
-def _solution_on_grid(problem: PathProblem, grid: Array) -> GridSolution:
-    """Return the solution on a grid (N + 1,).
+def _excess(problem: PathProblem, pieces: LawPieces, before: GridSolution | None) -> Array:
+    """Return the excess of pieces, shape (k, 2, N), known of those that were pieces of a solution before."""
+    if before is None:
+        return problem.excess(pieces)
+    index, same = pieces.among(before.pieces)
+    excess, new = before.excess[:, :, index], np.flatnonzero(~same)
+    if new.size:
+        excess[:, :, new] = problem.excess(pieces.chosen(new))
+    return np.asarray(excess)
+
+
+def _solution_on_grid(problem: PathProblem, grid: Array, before: GridSolution | None) -> GridSolution:
+    """Return the solution on a grid (N + 1,); one on another grid spares some work.
 
     Raises:
         UnreachableSpeedError: When there is no motion with the speeds at the ends.
         UnlimitedSpeedError: When nothing limits the motion somewhere.
     """
     rows = interval_rows(grid, problem.constraints, problem.stops)
-    return _judged(problem, rows, solve(rows, *problem.ends))
+    return _judged(problem, rows, solve(rows, *problem.ends), np.zeros(grid.size - 1, dtype=bool), before)
 
 
 def _refined_solution(problem: PathProblem) -> tuple[GridSolution, int, float]:
     """Return the solution on a fine enough grid, how often it was refined, and what is lost."""
     path = problem.joints.path
-    grid, most = first_grid(path), most_intervals(path)
+    grid, most, before = first_grid(path), most_intervals(path), None
     for rounds in range(_ROUNDS + 1):
         try:
-            solution = _solution_on_grid(problem, grid)
+            before = solution = _solution_on_grid(problem, grid, before)
         except UnreachableSpeedError:  # a finer grid has room for a little more
             if rounds >= _TRIES or 2 * grid.size > most:
                 raise

@@ -34,12 +34,13 @@ class LawPieces:
         """Return some of the pieces."""
         return LawPieces(self.durations[which], self.coefficients[:, which])
 
-    def differ(self, others: LawPieces) -> NDArray[np.bool_]:
-        """Return which pieces are not the same as those of a law over the same intervals, shape (N,)."""
-        if self.coefficients.shape != others.coefficients.shape:
-            return np.ones(self.durations.size, dtype=bool)
-        apart = (self.coefficients != others.coefficients).any(axis=0)
-        return np.asarray(apart | (self.durations != others.durations))
+    def among(self, others: LawPieces) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Return which of other pieces each may be, by where it begins, and whether it is, each (N,)."""
+        index = np.searchsorted(others.coefficients[-1, 1:], self.coefficients[-1], "right")
+        if self.coefficients.shape[0] != others.coefficients.shape[0]:
+            return index, np.zeros(index.size, dtype=bool)
+        same = (self.coefficients == others.coefficients[:, index]).all(axis=0)
+        return index, same & (self.durations == others.durations[index])
 
     def along(self, path: PiecewisePolynomial) -> Array:
         """Return the coefficients (degree + 1, n, N) of q(s(t)).
