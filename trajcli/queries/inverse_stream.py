@@ -151,9 +151,10 @@ class _Follower:
         low, high = widened(solutions.bounds).T
         with np.errstate(invalid="ignore"):
             down, up = np.ceil((low - solutions.joints) / FULL), np.floor((high - solutions.joints) / FULL)
-        self._down: Array = np.where(self._turning, np.minimum(down, 0.0), 0.0)
-        self._up: Array = np.where(self._turning, np.maximum(up, 0.0), 0.0)
-        self._refused: Array = np.where(self._usable, 0.0, np.inf)
+        usable = self._usable[..., None]
+        turns = np.where(self._turning & usable, [np.minimum(down, 0.0), np.maximum(up, 0.0)], 0.0)
+        self._down, self._up = np.ascontiguousarray(turns)  # numbers of a row beside each other
+        self._joints: Array = np.ascontiguousarray(np.where(usable, solutions.joints, np.inf))
 
     def take(self, row: int, last: Array) -> Array:
         """Return the answers (k, n), k >= 1, of the rows from `row` on, each nearest to the one before.
@@ -170,7 +171,7 @@ class _Follower:
             return self._solved_alone(row, last)[None] if continued is None else continued
         if self._alone[row]:
             return self._solved_alone(row, last)[None]
-        answers, branch = self._nearest(self._solutions, row, last)
+        answers, branch = self._nearest(row, last)
         if row + 1 == len(self._alone):
             return answers
         if self._stays:
@@ -195,9 +196,9 @@ class _Follower:
             if self._alone[k]:
                 break
             nearest = self._table[k - start][branch]
-            turned = self._turned(solutions.joints[k, nearest].tolist(), values)
+            turned = self._turned(self._joints[k, nearest].tolist(), values)
             if turned is None:
-                rows, nearest = self._nearest(solutions, k, np.array(values))
+                rows, nearest = self._nearest(k, np.array(values))
                 turned = rows[0].tolist()
             stayed = stayed + 1 if nearest == branch else 0
             values, branch = turned, nearest
@@ -222,16 +223,16 @@ class _Follower:
 
     def _nearest_branches(self, solutions: Solutions, row: int) -> list[list[int]]:
         """Return the nearest branch of some rows from `row` on, for each branch of the row before."""
-        joints = solutions.joints[row - 1 : row + _TOGETHER]
-        usable = self._usable[row : row + _TOGETHER]
-        farthest = np.zeros((len(usable), joints.shape[1], joints.shape[1]))  # (rows, from, to)
-        for values, turns in zip(np.moveaxis(joints, -1, 0), self._turning, strict=True):
-            gap = values[1:, None, :] - values[:-1, :, None]
+        joints = solutions.joints[row - 1 : row + _TOGETHER].T  # (n, branches, rows), as they are stored
+        usable = self._usable[row : row + _TOGETHER].T
+        farthest = np.zeros((len(usable), *usable.shape))  # (from, to, rows)
+        for values, turns in zip(joints, self._turning, strict=True):
+            gap = values[:, 1:] - values[:, None, :-1]
             if turns:
                 gap -= FULL * np.rint(gap * (1.0 / FULL))
             np.maximum(farthest, np.abs(gap, out=gap), out=farthest)
-        farthest += np.where(usable, 0.0, np.inf)[:, None]
-        nearest: list[list[int]] = farthest.argmin(axis=2).tolist()
+        farthest += np.where(usable, 0.0, np.inf)
+        nearest: list[list[int]] = farthest.argmin(axis=1).T.tolist()
         return nearest
 
     def _on_one_branch(self, solutions: Solutions, row: int, last: Array) -> Array:
@@ -253,15 +254,18 @@ class _Follower:
         wrapped = np.where(self._turning, gaps - FULL * np.round(gaps / FULL), gaps)
         return np.where(usable, np.abs(wrapped).max(axis=-1), np.inf)
 
-    def _nearest(self, solutions: Solutions, row: int, last: Array) -> tuple[Array, int]:
+    def _nearest(self, row: int, last: Array) -> tuple[Array, int]:
         """Return the nearest answer (1, n) of one row, and its branch; few steps, as rows may be many."""
-        joints = solutions.joints[row]
-        turns = np.rint((last - joints) / FULL)
+        joints = self._joints[row]
+        turns = last - joints
+        turns /= FULL
+        np.rint(turns, out=turns)
         np.maximum(turns, self._down[row], out=turns)
         np.minimum(turns, self._up[row], out=turns)
-        values = joints + FULL * turns
-        farthest = np.maximum.reduce(np.abs(values - last), axis=1)
-        branch = int((farthest + self._refused[row]).argmin())
+        values = FULL * turns
+        values += joints
+        gaps = values - last
+        branch = int(np.maximum.reduce(np.abs(gaps, out=gaps), axis=1).argmin())
         return values[branch : branch + 1], branch
 
     def _continued(self, row: int, last: Array) -> Array | None:
