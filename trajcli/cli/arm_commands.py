@@ -21,6 +21,8 @@ from trajcli.cli.options import (
     RobotName,
     Si,
     Tool,
+    argument,
+    option,
     robot_names,
 )
 
@@ -119,10 +121,8 @@ class FkCommand(NumbersCommand):
     joints: Joints
     tool: Tool = None
     base: Base = None
-    frame: Annotated[
-        Literal["world", "base"], typer.Option("--frame", help="Where the pose is counted from.")
-    ] = "world"
-    links: Annotated[bool, typer.Option("--links", help="Also the frame of each link.")] = False
+    frame: Annotated[Literal["world", "base"], option("--frame", "Where the pose is counted from.")] = "world"
+    links: Annotated[bool, option("--links", "Also the frame of each link.")] = False
     units: ArmUnits = None
     si: Si = False
     as_json: Json = False
@@ -142,31 +142,26 @@ class IkCommand(NumbersCommand):
     example = "trajcli ik -r ur5e --pose '{xyz: [0.4, 0.1, 0.3]}'"
 
     robot: RobotName
-    rows: Annotated[list[str] | None, typer.Argument(metavar="-", help="- reads poses from a CSV.")] = None
+    rows: Annotated[list[str] | None, argument("-", "- reads poses from a CSV.")] = None
     pose: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--pose",
-            metavar="POSE",
-            help="T_world_tcp as YAML or @FILE; what it leaves out is free. joints: {NAME: X} pins joints.",
+            "T_world_tcp as YAML or @FILE; what it leaves out is free. joints: {NAME: X} pins joints.",
+            "POSE",
         ),
     ] = None
     near: Annotated[
-        str | None,
-        typer.Option(
-            "--near", metavar="Q...", help="Joint values to be near to, instead of zero; -- ends them."
-        ),
+        str | None, option("--near", "Joint values to be near to, instead of zero; -- ends them.", "Q...")
     ] = None
     every: Annotated[
-        bool,
-        typer.Option("--all", help="Also answers outside the limits; of a CSV every branch of each pose."),
+        bool, option("--all", "Also answers outside the limits; of a CSV every branch of each pose.")
     ] = False
-    turns: Annotated[
-        bool, typer.Option("--turns", help="Also every full turn of a joint that its limits allow.")
-    ] = False
+    turns: Annotated[bool, option("--turns", "Also every full turn of a joint that its limits allow.")] = (
+        False
+    )
     tolerance: Annotated[
-        float,
-        typer.Option("--tolerance", metavar="TOL", help="What an answer may miss by, m and rad: 1e-12 to 1."),
+        float, option("--tolerance", "What an answer may miss by, m and rad: 1e-12 to 1.", "TOL")
     ] = 1e-6
     tool: Tool = None
     base: Base = None
@@ -190,15 +185,11 @@ class JacobianCommand(NumbersCommand):
     tool: Tool = None
     base: Base = None
     frame: Annotated[
-        Literal["world", "base", "tcp"], typer.Option("--frame", help="In whose axes the rows are written.")
+        Literal["world", "base", "tcp"], option("--frame", "In whose axes the rows are written.")
     ] = "world"
     rates: Annotated[
         str | None,
-        typer.Option(
-            "--qd",
-            metavar="V...",
-            help="A rate for each joint, for the acceleration they cause; -- ends them.",
-        ),
+        option("--qd", "A rate for each joint, for the acceleration they cause; -- ends them.", "V..."),
     ] = None
     units: ArmUnits = None
     si: Si = False
@@ -219,18 +210,11 @@ class DynamicsCommand(NumbersCommand):
     tool: Tool = None
     base: Base = None
     payload: Annotated[
-        str | None,
-        typer.Option(
-            "--payload", metavar="PAYLOAD", help="What the tool carries, {mass, com?, inertia?} or @FILE."
-        ),
+        str | None, option("--payload", "What the tool carries, {mass, com?, inertia?} or @FILE.", "PAYLOAD")
     ] = None
-    rates: Annotated[
-        str | None,
-        typer.Option("--qd", metavar="V...", help="A velocity for each joint; -- ends them."),
-    ] = None
+    rates: Annotated[str | None, option("--qd", "A velocity for each joint; -- ends them.", "V...")] = None
     accelerations: Annotated[
-        str | None,
-        typer.Option("--qdd", metavar="A...", help="An acceleration for each joint; -- ends them."),
+        str | None, option("--qdd", "An acceleration for each joint; -- ends them.", "A...")
     ] = None
     units: ArmUnits = None
     si: Si = False
@@ -244,37 +228,27 @@ class PoseCommand(NumbersCommand):
     example = "trajcli pose --units deg '{rpy: [0, 0, 90]}' '{xyz: [1, 0, 0]}'"
 
     steps: Annotated[
-        list[str],
-        typer.Argument(metavar="STEP...", help="Poses as YAML or @FILE, with `frame` and `invert` beside."),
+        list[str], argument("STEP...", "Poses as YAML or @FILE, with `frame` and `invert` beside.")
     ]
-    units: Annotated[
-        str,
-        typer.Option("--units", metavar="UNITS", help="Of plain numbers, such as deg,mm; else rad and m."),
-    ] = ""
-    inverse: Annotated[bool, typer.Option("--inverse", help="Take the inverse of the result.")] = False
+    units: Annotated[str, option("--units", "Of plain numbers, such as deg,mm; else rad and m.", "UNITS")] = (
+        ""
+    )
+    inverse: Annotated[bool, option("--inverse", "Take the inverse of the result.")] = False
     point: Annotated[
-        str | None,
-        typer.Option(
-            "--point", metavar="X Y Z", help="A point in the pose's frame, to be said in the first."
-        ),
+        str | None, option("--point", "A point in the pose's frame, to be said in the first.", "X Y Z")
     ] = None
-    euler: Annotated[
-        str | None,
-        typer.Option("--euler", metavar="ZYZ[:fixed]", help="Also both triples of these angles."),
-    ] = None
-    to: Annotated[
-        str | None, typer.Option("--to", metavar="POSE", help="Print poses on the way to this one.")
-    ] = None
-    s: Annotated[str | None, typer.Option("--s", metavar="S,...", help="Where on the way, from 0 to 1.")] = (
+    euler: Annotated[str | None, option("--euler", "Also both triples of these angles.", "ZYZ[:fixed]")] = (
         None
     )
+    to: Annotated[str | None, option("--to", "Print poses on the way to this one.", "POSE")] = None
+    s: Annotated[str | None, option("--s", "Where on the way, from 0 to 1.", "S,...")] = None
     path: Annotated[
         Literal["line", "screw"] | None,
-        typer.Option("--path", help="line: the origin goes straight; screw: constant twist."),
+        option("--path", "line: the origin goes straight; screw: constant twist."),
     ] = None
     orientation: Annotated[
         Literal["axis_angle", "euler"] | None,
-        typer.Option("--orientation", help="On a line: about one axis, or by even Euler angles."),
+        option("--orientation", "On a line: about one axis, or by even Euler angles."),
     ] = None
     as_json: Json = False
 
@@ -286,34 +260,20 @@ class RobotsCommand(Command):
 
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar="NAME|FILE",
-            help="One robot, or a job's; without it all are listed.",
-            autocompletion=robot_names,
+        argument(
+            "NAME|FILE", "One robot, or a job's; without it all are listed.", autocompletion=robot_names
         ),
     ] = None
     kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind", metavar="KIND", help="List those with joints such as 6R or RRPR; real; textbook."
-        ),
+        str | None, option("--kind", "List those with joints such as 6R or RRPR; real; textbook.", "KIND")
     ] = None
-    joints: Annotated[
-        int | None, typer.Option("--joints", metavar="N", min=1, help="List those with that many joints.")
-    ] = None
+    joints: Annotated[int | None, option("--joints", "List those with that many joints.", "N", min=1)] = None
     maker: Annotated[
-        str | None,
-        typer.Option("--maker", metavar="TEXT", help="List those of a maker; part of the name will do."),
+        str | None, option("--maker", "List those of a maker; part of the name will do.", "TEXT")
     ] = None
-    text: Annotated[
-        str | None, typer.Option("--search", metavar="TEXT", help="List those with this in their names.")
-    ] = None
-    as_yaml: Annotated[
-        bool, typer.Option("--yaml", help="Print the robot's file, to start a new one from.")
-    ] = False
-    as_urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for viewers and ROS.")] = (
-        False
-    )
+    text: Annotated[str | None, option("--search", "List those with this in their names.", "TEXT")] = None
+    as_yaml: Annotated[bool, option("--yaml", "Print the robot's file, to start a new one from.")] = False
+    as_urdf: Annotated[bool, option("--urdf", "Print the robot as URDF, for viewers and ROS.")] = False
     as_json: Json = False
 
 
@@ -322,29 +282,25 @@ class UrdfCommand(Command):
 
     example = "trajcli urdf arm.urdf -o robot.yaml"
 
-    file: Annotated[str, typer.Argument(metavar="FILE", help="The URDF; - is standard input.")]
+    file: Annotated[str, argument("FILE", "The URDF; - is standard input.")]
     root: Annotated[
-        str | None,
-        typer.Option("--root", metavar="LINK", help="Where the chain begins; else the outermost link."),
+        str | None, option("--root", "Where the chain begins; else the outermost link.", "LINK")
     ] = None
     tip: Annotated[
         str | None,
-        typer.Option(
-            "--tip", metavar="LINK", help="Where it ends, the tcp; else the longest chain without a gripper."
-        ),
+        option("--tip", "Where it ends, the tcp; else the longest chain without a gripper.", "LINK"),
     ] = None
-    exact: Annotated[
-        bool, typer.Option("--exact", help="Keep angles within 1e-3 rad of right angles as they are.")
-    ] = False
-    soft: Annotated[
-        bool, typer.Option("--soft", help="Tighten ranges to the soft limits of <safety_controller>.")
-    ] = False
+    exact: Annotated[bool, option("--exact", "Keep angles within 1e-3 rad of right angles as they are.")] = (
+        False
+    )
+    soft: Annotated[bool, option("--soft", "Tighten ranges to the soft limits of <safety_controller>.")] = (
+        False
+    )
     output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write the robot file instead of printing it."),
+        str | None, option("--output -o", "Write the robot file instead of printing it.", "FILE")
     ] = None
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Every note on what was decided, not only the first.")
+        bool, option("--verbose -v", "Every note on what was decided, not only the first.")
     ] = False
 
 
@@ -362,48 +318,41 @@ class CalibrateCommand(Command):
     robot: RobotName
     file: Annotated[
         str | None,
-        typer.Argument(
-            metavar="FILE",
-            help="Measured poses: a YAML list of {joints, pose}, or a CSV, - on stdin; candidates of --plan.",
+        argument(
+            "FILE",
+            "Measured poses: a YAML list of {joints, pose}, or a CSV, - on stdin; candidates of --plan.",
         ),
     ] = None
     free: Annotated[
         str,
-        typer.Option(
+        option(
             "--free",
-            metavar="all|NAME,...",
-            help="Parameters: all, dh, base, tool, a joint, or such as j1.theta,j2.d,base.x,tool.rz.",
+            "Parameters: all, dh, base, tool, a joint, or such as j1.theta,j2.d,base.x,tool.rz.",
+            "all|NAME,...",
         ),
     ] = "all"
     output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The corrected robot's file; a plan's CSV."),
+        str | None, option("--output -o", "The corrected robot's file; a plan's CSV.", "FILE")
     ] = None
     scale: Annotated[
-        str | None,
-        typer.Option(
-            "--scale", metavar="L", help="Length that counts like a radian; else all lengths of the arm."
-        ),
+        str | None, option("--scale", "Length that counts like a radian; else all lengths of the arm.", "L")
     ] = None
     loss: Annotated[
         Literal["linear", "huber", "cauchy"],
-        typer.Option("--loss", help="How a measurement far off counts: squared, or less."),
+        option("--loss", "How a measurement far off counts: squared, or less."),
     ] = "linear"
     loss_scale: Annotated[
         float | None,
-        typer.Option(
-            "--loss-scale",
-            metavar="K",
-            help="Times the median residual: what is beyond counts less; 1.5 if left out.",
+        option(
+            "--loss-scale", "Times the median residual: what is beyond counts less; 1.5 if left out.", "K"
         ),
     ] = None
     plan: Annotated[
-        int | None,
-        typer.Option("--plan", metavar="N", help="Propose N configurations to measure, as CSV or JSON."),
+        int | None, option("--plan", "Propose N configurations to measure, as CSV or JSON.", "N")
     ] = None
     measure: Annotated[
         Literal["pose", "position"] | None,
-        typer.Option("--measure", help="What --plan expects to be measured; pose if left out."),
+        option("--measure", "What --plan expects to be measured; pose if left out."),
     ] = None
     tool: Tool = None
     units: ArmUnits = None
@@ -418,31 +367,23 @@ class MobilityCommand(Command):
 
     robot: Annotated[
         str | None,
-        typer.Option(
-            "--robot",
-            "-r",
-            metavar="NAME|FILE",
-            help="The open chain of a robot, or of a job's.",
-            autocompletion=robot_names,
+        option(
+            "--robot -r", "The open chain of a robot, or of a job's.", "NAME|FILE", autocompletion=robot_names
         ),
     ] = None
-    links: Annotated[
-        int | None, typer.Option("--links", metavar="N", help="Number of links, the frame counted.")
-    ] = None
+    links: Annotated[int | None, option("--links", "Number of links, the frame counted.", "N")] = None
     joints: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--joints",
-            metavar="F|FxCOUNT,...",
-            help="Freedoms of the joints: 1x4,3x2, or by kind: Rx4,Sx2 (R P H: 1, C U: 2, S: 3).",
+            "Freedoms of the joints: 1x4,3x2, or by kind: Rx4,Sx2 (R P H: 1, C U: 2, S: 3).",
+            "F|FxCOUNT,...",
         ),
     ] = None
     space: Annotated[
-        Literal["spatial", "planar"], typer.Option("--space", help="Where the links move: lambda 6 or 3.")
+        Literal["spatial", "planar"], option("--space", "Where the links move: lambda 6 or 3.")
     ] = "spatial"
-    passive: Annotated[
-        int, typer.Option("--passive", metavar="F0", help="Freedoms that change nothing for the others.")
-    ] = 0
+    passive: Annotated[int, option("--passive", "Freedoms that change nothing for the others.", "F0")] = 0
     as_json: Json = False
 
 

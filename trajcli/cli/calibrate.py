@@ -16,8 +16,6 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.job.inline import inline_number
 from trajcli.kinematics.calibration.fit import Options
-from trajcli.kinematics.calibration.measuring_plan import MeasuringPlan
-from trajcli.kinematics.calibration.parameters import ArmParameter
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.queries.arm import ArmInUnits, open_arm, open_sheet
 from trajcli.queries.calibration import (
@@ -57,7 +55,9 @@ def run_calibrate(options: CalibrateCommand) -> int:
     chosen = Options(
         characteristic_length(arm.robot) if length is None else length,
         options.loss,
-        _loss_scale(options),
+        Options(1.0).loss_scale
+        if options.loss_scale is None
+        else _positive(options.loss_scale, "--loss-scale"),
     )
     calibration = calibration_of(arm, options.file, options.free, chosen)
     if options.output is not None:
@@ -97,12 +97,6 @@ def _scale(arm: ArmInUnits, options: CalibrateCommand) -> float | None:
     if options.scale is None:
         return None
     return _positive(inline_number(options.scale, "--scale", Quantity("length"), arm.units), "--scale")
-
-
-def _loss_scale(options: CalibrateCommand) -> float:
-    if options.loss_scale is None:
-        return Options(1.0).loss_scale
-    return _positive(options.loss_scale, "--loss-scale")
 
 
 def _positive(value: float, name: str) -> float:
@@ -189,7 +183,10 @@ def _plan(arm: ArmInUnits, length: float | None, options: CalibrateCommand) -> i
         print_json(plan_report(arm, joints, plan, parameters))
     elif options.output is None:
         print_text(rows.decode())
-    print_remark(_summary(plan, parameters, count))
+    print_remark(
+        f"{count} configurations tell {plan.seen.rank} of {len(parameters)} parameters or combinations: "
+        f"O1 {plan.index:.4g}, condition {plan.condition:.4g}"
+    )
     return 0
 
 
@@ -200,10 +197,3 @@ def _csv(arm: ArmInUnits, joints: Array) -> bytes:
     out = BytesIO()
     write_csv([np.asarray(joints / arm.joint_factors)], columns, out)
     return out.getvalue()
-
-
-def _summary(plan: MeasuringPlan, parameters: Sequence[ArmParameter], count: int) -> str:
-    return (
-        f"{count} configurations tell {plan.seen.rank} of {len(parameters)} parameters or combinations: "
-        f"O1 {plan.index:.4g}, condition {plan.condition:.4g}"
-    )

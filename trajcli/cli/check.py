@@ -14,7 +14,7 @@ from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, at_
 from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
-from trajcli.output.annotations import AnnotationForm, annotations_of, render_annotations
+from trajcli.output.annotations import annotations_of, render_annotations
 from trajcli.streams.reading import motion_files
 from trajcli.units import Units, amount_text
 
@@ -78,8 +78,8 @@ def run_check(options: CheckCommand) -> int:
             print_remark(f"  event: {event}" if alone else f"{file}: event: {event}")
     if form == "json":
         print_json(found[0] if alone else found)
-    elif form != "table":
-        _print_annotations(problems, form, files)
+    elif form != "table" and (text := render_annotations(problems, form, files)):
+        print_text(text)
     return code
 
 
@@ -91,12 +91,6 @@ def _form(
     if options.as_json and options.form not in ("table", "json"):
         raise InputError(f"--json and --format {options.form} exclude each other", hint="leave one out")
     return "json" if options.as_json else options.form
-
-
-def _print_annotations(problems: Sequence[Problem], form: AnnotationForm, files: Sequence[str]) -> None:
-    text = render_annotations(problems, form, files)
-    if text:
-        print_text(text)
 
 
 def _judged(file: str, options: CheckCommand) -> tuple[CheckedFile, MotionReference | None]:
@@ -157,14 +151,14 @@ def _beside(beside: MotionReference, units: Units) -> Iterator[str]:
     elif reference.ratio is not None:
         fastest = f"the fastest between its ends ({reference.duration:.6g} s, {reference.joint}, ruckig)"
         yield f"  {beside.duration:.6g} s, {reference.ratio:.4g} x {fastest}"
-    yield from violation_lines("ruckig", reference.violations, "  ")
+    yield from violation_lines("ruckig", reference.violations)
     if path is not None:
         path = in_units(path, units)
         if path.duration is None or path.ratio is None:
             yield f"  {path.reason or 'nothing to move'}"
             return
         yield f"  {path.ratio:.4g} x toppra along the same path ({path.duration:.6g} s)"
-        yield from violation_lines("toppra", path.violations, "  ")
+        yield from violation_lines("toppra", path.violations)
 
 
 def _listed(findings: Sequence[Finding]) -> Iterator[Finding]:

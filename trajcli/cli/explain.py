@@ -160,12 +160,15 @@ def _lines(explained: Explanation, plan: Plan, *, peers: bool = False) -> Iterat
         yield from _efforts(move)
         yield from _speed(move)
         yield from _zones(explained, move.index)
-        yield from _peers(move) if peers else ()
+        if peers:
+            from trajcli.cli.plan import peer_lines
+
+            yield from peer_lines(move)
         yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
     if explained.savings is not None and len(explained.moves) > 1:
         yield ""
         yield "all moves together:"
-        yield from _savings(explained.savings, "  ")
+        yield from _savings(explained.savings)
     general = [event for event in noted if event.move is None]
     yield from _flown_by(explained)
     yield from (f"{event.kind}: {event.message}" for event in general)
@@ -193,12 +196,6 @@ def _zones(explained: Explanation, move: int) -> Iterator[str]:
             text += f"; the tool {zone.nearest:.4g} to {zone.farthest:.4g} {zone.length_unit} from the corner"
             text += f", {zone.deviation:.4g} {zone.length_unit} off its path"
         yield f"{text}; binding: {zone.binds}"
-
-
-def _peers(move: ExplainedMove) -> Iterator[str]:
-    from trajcli.cli.plan import peer_lines
-
-    return peer_lines(move, "  ")
 
 
 def _phases(move: ExplainedMove) -> Iterator[str]:
@@ -307,22 +304,22 @@ def _at_limit(one: AtLimitReport) -> str:
     return f"{name} of {one.joint} for {one.seconds:.6g} s ({100 * one.share:.4g} %)"
 
 
-def _savings(savings: Sequence[SavingReport] | None, indent: str) -> Iterator[str]:
+def _savings(savings: Sequence[SavingReport] | None) -> Iterator[str]:
     """Yield what higher limits would save, of those that save something."""
     if savings is None:
         return
     if not savings:
-        yield f"{indent}its limits do not say how long it lasts: none that is higher would save time"
+        yield "  its limits do not say how long it lasts: none that is higher would save time"
         return
     useful = [one for one in savings if one.saved]
     if not useful:
-        yield f"{indent}no limit of a joint that is 10 % higher would save time"
+        yield "  no limit of a joint that is 10 % higher would save time"
     for one in useful:
         share = f" ({100 * one.share:.4g} %)" if one.share is not None else ""
-        yield f"{indent}10 % more {one.quantity} of {one.joint} would save {one.saved:.6g} s{share}"
+        yield f"  10 % more {one.quantity} of {one.joint} would save {one.saved:.6g} s{share}"
     for one in savings:
         if one.reason is not None:
-            yield f"{indent}10 % more {one.quantity} of {one.joint}: {one.reason}"
+            yield f"  10 % more {one.quantity} of {one.joint}: {one.reason}"
 
 
 def _speed(move: ExplainedMove) -> Iterator[str]:
@@ -334,7 +331,7 @@ def _speed(move: ExplainedMove) -> Iterator[str]:
         times = ", ".join(_at_limit(one) for one in move.at_limit[:_MOST_LIMITS])
         more = f" and {len(move.at_limit) - _MOST_LIMITS} more" if len(move.at_limit) > _MOST_LIMITS else ""
         yield f"  at its limits: {times}{more}"
-    yield from _savings(move.savings, "  ")
+    yield from _savings(move.savings)
     if move.stretch != 1:
         yield f"  stretched {move.stretch:.6g} times"
     if reference is None:

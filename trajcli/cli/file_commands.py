@@ -7,10 +7,17 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import typer
-
 from trajcli.cli.command import Command
-from trajcli.cli.options import Json, Overrides, TopicName, joint_names, profile_words, quantity_names
+from trajcli.cli.options import (
+    Json,
+    Overrides,
+    TopicName,
+    argument,
+    joint_names,
+    option,
+    profile_words,
+    quantity_names,
+)
 
 
 class DiffCommand(Command):
@@ -20,32 +27,23 @@ class DiffCommand(Command):
 
     files: Annotated[
         list[str],
-        typer.Argument(
-            metavar="A... B",
-            help="Two files, or files and folders and the folder to compare them with; - is CSV from stdin.",
+        argument(
+            "A... B",
+            "Two files, or files and folders and the folder to compare them with; - is CSV from stdin.",
         ),
     ]
     atol: Annotated[
-        str,
-        typer.Option(
-            "--atol", metavar="TOL", help="Absolute tolerance: 1e-9, or by column: q=1e-9,qd1=1e-6."
-        ),
+        str, option("--atol", "Absolute tolerance: 1e-9, or by column: q=1e-9,qd1=1e-6.", "TOL")
     ] = ""
-    rtol: Annotated[
-        str, typer.Option("--rtol", metavar="TOL", help="Relative tolerance, in the same form.")
-    ] = ""
-    resample: Annotated[
-        bool, typer.Option("--resample", help="Interpolate B at the times of A when they differ.")
-    ] = False
+    rtol: Annotated[str, option("--rtol", "Relative tolerance, in the same form.", "TOL")] = ""
+    resample: Annotated[bool, option("--resample", "Interpolate B at the times of A when they differ.")] = (
+        False
+    )
     topic: TopicName = None
     view: Annotated[
-        str | None,
-        typer.Option("--view", metavar="FILE", help="Also write a page that plays both of two files."),
+        str | None, option("--view", "Also write a page that plays both of two files.", "FILE")
     ] = None
-    robot: Annotated[
-        str | None,
-        typer.Option("--robot", "-r", metavar="NAME|FILE|JOB", help="The arm of that page."),
-    ] = None
+    robot: Annotated[str | None, option("--robot -r", "The arm of that page.", "NAME|FILE|JOB")] = None
     as_json: Json = False
 
 
@@ -56,46 +54,37 @@ class PlotCommand(Command):
 
     files: Annotated[
         list[str],
-        typer.Argument(
-            metavar="JOB|FILE...",
-            help="A job, two, files of rows or messages, or such over a job; - is stdin.",
-        ),
+        argument("JOB|FILE...", "A job, two, files of rows or messages, or such over a job; - is stdin."),
     ]
     output: Annotated[
         str | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
+        option(
+            "--output -o",
+            "FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
+            "FILE",
         ),
     ] = None
     kind: Annotated[
-        Literal["svg", "png", "pdf"] | None, typer.Option("--format", help="Where no name says it; else svg.")
+        Literal["svg", "png", "pdf"] | None, option("--format", "Where no name says it; else svg.")
     ] = None
     quantities: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--quantities",
-            metavar="LIST",
-            help="Some of q,qd,qdd,qddd,tau,tool,path,phase; else those that suit the job.",
+            "Some of q,qd,qdd,qddd,tau,tool,path,phase; else those that suit the job.",
+            "LIST",
             autocompletion=quantity_names,
         ),
     ] = None
     joints: Annotated[
         list[str],
-        typer.Option(
-            "--joints",
-            metavar="NAME...",
-            help="Only these, as a,b or a b; else all.",
-            autocompletion=joint_names,
-        ),
+        option("--joints", "Only these, as a,b or a b; else all.", "NAME...", autocompletion=joint_names),
     ] = []
     override: Overrides = []
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Do not say what was written.")] = False
-    every: Annotated[
-        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
-    ] = False
+    quiet: Annotated[bool, option("--quiet -q", "Do not say what was written.")] = False
+    every: Annotated[bool, option("--all", "Every finding, not only the worst of each move and kind.")] = (
+        False
+    )
 
 
 class ViewCommand(Command):
@@ -105,34 +94,30 @@ class ViewCommand(Command):
 
     sources: Annotated[
         list[str],
-        typer.Argument(
-            metavar="JOB|FILE...",
-            help="A job, or a file of rows or messages, - from standard input; a second to compare it with.",
+        argument(
+            "JOB|FILE...",
+            "A job, or a file of rows or messages, - from standard input; a second to compare it with.",
         ),
     ]
     output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write the page to FILE.html instead of stdout."),
+        str | None, option("--output -o", "Write the page to FILE.html instead of stdout.", "FILE")
     ] = None
-    compress: Annotated[bool, typer.Option("--compress", help="Half the size, for browsers since 2023.")] = (
-        False
-    )
+    compress: Annotated[bool, option("--compress", "Half the size, for browsers since 2023.")] = False
     robot: Annotated[
         str | None,
-        typer.Option(
-            "--robot",
-            "-r",
-            metavar="NAME|FILE|JOB",
-            help="The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
+        option(
+            "--robot -r",
+            "The arm of a file: of the catalogue, a robot file, a URDF, or a job.",
+            "NAME|FILE|JOB",
         ),
     ] = None
     meshes: Annotated[
         float,
-        typer.Option(
+        option(
             "--meshes",
-            metavar="MB",
+            "Of a URDF: how long its visual meshes may be, simplified to that; with 0 none are drawn.",
+            "MB",
             min=0,
-            help="Of a URDF: how long its visual meshes may be, simplified to that; with 0 none are drawn.",
         ),
     ] = 0.5
     override: Overrides = []
@@ -144,10 +129,7 @@ class ProfilesCommand(Command):
     example = "trajcli profiles ros-jtc"
 
     name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="NAME", help="One consumer; without it all are listed.", autocompletion=profile_words
-        ),
+        str | None, argument("NAME", "One consumer; without it all are listed.", autocompletion=profile_words)
     ] = None
     as_json: Json = False
 
@@ -158,8 +140,7 @@ class SchemaCommand(Command):
     example = "trajcli schema job"
 
     kind: Annotated[
-        Literal["job", "robot", "report", "explanation"],
-        typer.Argument(help="Which schema.", show_default=True),
+        Literal["job", "robot", "report", "explanation"], argument(None, "Which schema.", show_default=True)
     ] = "job"
 
 
@@ -168,8 +149,8 @@ class InitCommand(Command):
 
     example = "trajcli init job.yaml"
 
-    file: Annotated[str, typer.Argument(metavar="FILE", help="The file to write; - is stdout.")] = "job.yaml"
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False
+    file: Annotated[str, argument("FILE", "The file to write; - is stdout.")] = "job.yaml"
+    force: Annotated[bool, option("--force", "Overwrite the file if it exists.")] = False
 
 
 COMMANDS = (DiffCommand, PlotCommand, ViewCommand, ProfilesCommand, SchemaCommand, InitCommand)

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import typer
-
 from trajcli.cli.command import Command, CommandLine
 from trajcli.cli.options import (
     ColumnMap,
@@ -22,6 +20,8 @@ from trajcli.cli.options import (
     Overrides,
     RowTimes,
     TopicName,
+    argument,
+    option,
     profile_words,
     robot_names,
 )
@@ -34,74 +34,57 @@ class PlanCommand(CommandLine):
     module = "gate"
 
     job: JobFile
-    others: Annotated[
-        list[str], typer.Argument(metavar="JOB", help="More jobs, which are only judged: with --no-output.")
-    ] = []
+    others: Annotated[list[str], argument("JOB", "More jobs, which are only judged: with --no-output.")] = []
     output: Annotated[
         str | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="FILE.csv, .mcap, .jsonl, .npy, .npz or .yaml (a ROS message).",
-        ),
+        option("--output -o", "FILE.csv, .mcap, .jsonl, .npy, .npz or .yaml (a ROS message).", "FILE"),
     ] = None
     form: MotionForm = None
-    report: Annotated[
-        str | None, typer.Option("--report", metavar="FILE", help="Write the verification report as JSON.")
-    ] = None
+    report: Annotated[str | None, option("--report", "Write the verification report as JSON.", "FILE")] = None
     resolved: Annotated[
         str | None,
-        typer.Option(
-            "--resolved", metavar="FILE", help="Write the job as it was understood: names, units and limits."
-        ),
+        option("--resolved", "Write the job as it was understood: names, units and limits.", "FILE"),
     ] = None
-    rate: Annotated[str | None, typer.Option("--rate", metavar="HZ", help="Rows per second.")] = None
+    rate: Annotated[str | None, option("--rate", "Rows per second.", "HZ")] = None
     rows: RowTimes = None
     override: Overrides = []
     digits: Annotated[
         Literal["fixed", "full"] | None,
-        typer.Option("--digits", help="fixed: nine decimals; full: every bit.", show_default="fixed"),
+        option("--digits", "fixed: nine decimals; full: every bit.", show_default="fixed"),
     ] = None
     topics: Annotated[
         str | None,
-        typer.Option(
-            "--topics",
-            metavar="/A,/B",
-            help="MCAP: topics beside the usual ones, /joint_trajectory_point or /tool_twist.",
+        option(
+            "--topics", "MCAP: topics beside the usual ones, /joint_trajectory_point or /tool_twist.", "/A,/B"
         ),
     ] = None
     epoch: Annotated[
-        str | None,
-        typer.Option("--epoch", metavar="SECONDS", help="MCAP: time of the log at t = 0.", show_default="0"),
+        str | None, option("--epoch", "MCAP: time of the log at t = 0.", "SECONDS", show_default="0")
     ] = None
     compression: Annotated[
         Literal["zstd", "lz4", "none"] | None,
-        typer.Option("--compression", help="MCAP: of the messages.", show_default="zstd"),
+        option("--compression", "MCAP: of the messages.", show_default="zstd"),
     ] = None
     strict: Annotated[
-        bool,
-        typer.Option("--strict", help="Exit 1 when there is an event: a concession, or a warning of --for."),
+        bool, option("--strict", "Exit 1 when there is an event: a concession, or a warning of --for.")
     ] = False
     reference: Annotated[
         bool,
-        typer.Option(
+        option(
             "--reference",
-            help="Compare each move with the fastest under the same limits, along a path with toppra.",
+            "Compare each move with the fastest under the same limits, along a path with toppra.",
         ),
     ] = False
     consumer: Consumer = None
-    no_output: Annotated[bool, typer.Option("--no-output", help="Only judge: write no rows.")] = False
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="Also how curves were computed, in the summary.")
-    ] = False
+    no_output: Annotated[bool, option("--no-output", "Only judge: write no rows.")] = False
+    quiet: Annotated[bool, option("--quiet -q", "No summary on stderr.")] = False
+    verbose: Annotated[bool, option("--verbose -v", "Also how curves were computed, in the summary.")] = False
     si: Annotated[
-        bool, typer.Option("--si", help="Rows in rad and m, whatever units the job has: plain column names.")
+        bool, option("--si", "Rows in rad and m, whatever units the job has: plain column names.")
     ] = False
-    every: Annotated[
-        bool, typer.Option("--all", help="Every finding, not only the worst of each move and kind.")
-    ] = False
+    every: Annotated[bool, option("--all", "Every finding, not only the worst of each move and kind.")] = (
+        False
+    )
     errors: JobErrors = "text"
 
 
@@ -112,27 +95,18 @@ class ExplainCommand(Command):
 
     job: JobFile
     override: Overrides = []
-    move: Annotated[
-        int | None, typer.Option("--move", metavar="N", help="Only this move, counted from 0.")
-    ] = None
+    move: Annotated[int | None, option("--move", "Only this move, counted from 0.", "N")] = None
     derivatives: Annotated[
-        bool, typer.Option("--derivatives", help="Also the polynomials of velocity and acceleration.")
+        bool, option("--derivatives", "Also the polynomials of velocity and acceleration.")
     ] = False
     sensitivity: Annotated[
-        bool,
-        typer.Option(
-            "--sensitivity", help="What each limit that is 10 % higher would save: plans the moves anew."
-        ),
+        bool, option("--sensitivity", "What each limit that is 10 % higher would save: plans the moves anew.")
     ] = False
     reference: Annotated[
         bool,
-        typer.Option(
-            "--reference", help="Compare each move along a path with toppra, and judge what peers return."
-        ),
+        option("--reference", "Compare each move along a path with toppra, and judge what peers return."),
     ] = False
-    full: Annotated[
-        bool, typer.Option("--full", help="On a terminal, too, every formula, not only what binds.")
-    ] = False
+    full: Annotated[bool, option("--full", "On a terminal, too, every formula, not only what binds.")] = False
     as_json: Json = False
 
 
@@ -150,8 +124,7 @@ class PayloadCommand(Command):
     job: JobFile
     override: Overrides = []
     at: Annotated[
-        int | None,
-        typer.Option("--at", metavar="MOVE", help="Only what is carried in this move, counted from 0."),
+        int | None, option("--at", "Only what is carried in this move, counted from 0.", "MOVE")
     ] = None
     as_json: Json = False
 
@@ -163,89 +136,78 @@ class CheckCommand(Command):
 
     files: Annotated[
         list[str],
-        typer.Argument(
-            metavar="FILE|DIR...",
-            help="CSV, JSON lines, ROS, MCAP, .npy or .npz, and folders of such; - is stdin.",
-        ),
+        argument("FILE|DIR...", "CSV, JSON lines, ROS, MCAP, .npy or .npz, and folders of such; - is stdin."),
     ]
     job: Annotated[
-        str | None,
-        typer.Option("--job", metavar="JOB", help="Robot, limits, start, end and paths that it shall keep."),
+        str | None, option("--job", "Robot, limits, start, end and paths that it shall keep.", "JOB")
     ] = None
     override: Overrides = []
     robot: Annotated[
         str | None,
-        typer.Option(
-            "--robot",
-            "-r",
-            metavar="NAME|FILE",
-            help="Instead of a job: a robot of the catalogue, a robot file or a URDF.",
+        option(
+            "--robot -r",
+            "Instead of a job: a robot of the catalogue, a robot file or a URDF.",
+            "NAME|FILE",
             autocompletion=robot_names,
         ),
     ] = None
     limits: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--limits",
-            metavar="FILE|LIMITS",
-            help="Instead of the robot's: as under `limits` in a job, in a file or as {velocity: 2}.",
+            "Instead of the robot's: as under `limits` in a job, in a file or as {velocity: 2}.",
+            "FILE|LIMITS",
         ),
     ] = None
     columns: ColumnMap = None
-    rate: Annotated[
-        str | None, typer.Option("--rate", metavar="HZ", help="Rows per second of a file without time.")
-    ] = None
+    rate: Annotated[str | None, option("--rate", "Rows per second of a file without time.", "HZ")] = None
     units: FileUnits = None
     topic: TopicName = None
     field: FieldName = None
     interpolate: Annotated[
         Literal["hold", "linear", "cubic", "quintic", "jtc", "jtc-upsampling"] | None,
-        typer.Option(
+        option(
             "--interpolate",
-            help="How the consumer joins the rows.",
+            "How the consumer joins the rows.",
             show_default="the highest degree that the columns allow",
         ),
     ] = None
     profile: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--for",
-            metavar="PROFILE",
-            help="Also the rules of a consumer: `trajcli profiles` lists them.",
+            "Also the rules of a consumer: `trajcli profiles` lists them.",
+            "PROFILE",
             autocompletion=profile_words,
         ),
     ] = None
     payload: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--payload",
-            metavar="PAYLOAD",
-            help="What the arm of --robot carries, {mass, com?, inertia?} or @FILE; its efforts then count.",
+            "What the arm of --robot carries, {mass, com?, inertia?} or @FILE; its efforts then count.",
+            "PAYLOAD",
         ),
     ] = None
     start_tolerance: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--start-tolerance",
-            metavar="X",
-            help="How near the first row must be to the job's start.",
+            "How near the first row must be to the job's start.",
+            "X",
             show_default="0.001 rad or m",
         ),
     ] = None
     form: Annotated[
-        Literal["table", "json", "junit", "sarif", "github"],
-        typer.Option("--format", help="Of what is printed."),
+        Literal["table", "json", "junit", "sarif", "github"], option("--format", "Of what is printed.")
     ] = "table"
     as_json: Json = False
     reference: Annotated[
-        bool,
-        typer.Option(
-            "--reference", help="Compare with ruckig between its ends, and with toppra along its points."
-        ),
+        bool, option("--reference", "Compare with ruckig between its ends, and with toppra along its points.")
     ] = False
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Exit 1 also within rounding, and when there are events.")
-    ] = False
+    strict: Annotated[bool, option("--strict", "Exit 1 also within rounding, and when there are events.")] = (
+        False
+    )
 
 
 COMMANDS: tuple[type[CommandLine], ...] = (PlanCommand, ExplainCommand, PayloadCommand, CheckCommand)

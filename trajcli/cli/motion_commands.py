@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-import typer
-
 from trajcli.cli.command import Command, CommandLine
 from trajcli.cli.options import (
     ColumnMap,
@@ -20,31 +18,29 @@ from trajcli.cli.options import (
     MotionForm,
     RowTimes,
     TopicName,
+    argument,
+    option,
     robot_names,
     setting_paths,
 )
 
 MotionSource = Annotated[
-    str, typer.Argument(metavar="FILE", help="CSV, MCAP, ROS messages, JSON lines, .npy, .npz; - is stdin.")
+    str, argument("FILE", "CSV, MCAP, ROS messages, JSON lines, .npy, .npz; - is stdin.")
 ]
 MotionOutput = Annotated[
-    str | None,
-    typer.Option(
-        "--output", "-o", metavar="OUT", help="OUT.csv, .mcap, .jsonl or .yaml; else CSV to stdout."
-    ),
+    str | None, option("--output -o", "OUT.csv, .mcap, .jsonl or .yaml; else CSV to stdout.", "OUT")
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Nothing on stderr but errors.")]
-Count = Annotated[str | None, typer.Option("-j", metavar="N", help="Processes at a time; else one a core.")]
+Quiet = Annotated[bool, option("--quiet -q", "Nothing on stderr but errors.")]
+Count = Annotated[str | None, option("-j", "Processes at a time; else one a core.", "N")]
 Timeout = Annotated[
-    str | None,
-    typer.Option("--timeout", metavar="SECONDS", help="For each job; 0 for no end.", show_default="600"),
+    str | None, option("--timeout", "For each job; 0 for no end.", "SECONDS", show_default="600")
 ]
 Scheduler = Annotated[
     str | None,
-    typer.Option(
+    option(
         "--scheduler",
-        metavar="ADDRESS",
-        help="Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
+        "Of the cluster, such as tcp://10.0.0.5:8786; else that of Dask's configuration.",
+        "ADDRESS",
     ),
 ]
 
@@ -71,32 +67,26 @@ class BatchCommand(CommandLine):
 
     example = "trajcli batch examples/cubic.yaml examples/quintic.yaml -o rows"
 
-    jobs: Annotated[
-        list[str], typer.Argument(metavar="JOB|DIR...", help="Job files, and folders with job files.")
-    ]
+    jobs: Annotated[list[str], argument("JOB|DIR...", "Job files, and folders with job files.")]
     output: Annotated[
-        str | None,
-        typer.Option(
-            "--output", "-o", metavar="DIR", help="Where the rows go; else beside each job, under its name."
-        ),
+        str | None, option("--output -o", "Where the rows go; else beside each job, under its name.", "DIR")
     ] = None
     count: Count = None
     form: Annotated[
-        Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"],
-        typer.Option("--format", help="Of the rows."),
+        Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"], option("--format", "Of the rows.")
     ] = "csv"
     rows: RowTimes = None
     consumer: Consumer = None
-    force: Annotated[bool, typer.Option("--force", help="Plan unchanged jobs, too.")] = False
+    force: Annotated[bool, option("--force", "Plan unchanged jobs, too.")] = False
     timeout: Timeout = None
     engine: Annotated[
         Literal["processes", "dask"],
-        typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
+        option("--engine", "Processes of this machine, or the workers of a Dask cluster."),
     ] = "processes"
     scheduler: Scheduler = None
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
+    quiet: Annotated[bool, option("--quiet -q", "No summary on stderr.")] = False
     strict: Annotated[
-        bool, typer.Option("--strict", help="A job with an event fails: a concession, or a warning of --for.")
+        bool, option("--strict", "A job with an event fails: a concession, or a warning of --for.")
     ] = False
     errors: JobErrors = "text"
 
@@ -112,50 +102,41 @@ class SweepCommand(Command):
     job: JobFile
     vary: Annotated[
         list[str],
-        typer.Option(
+        option(
             "--vary",
-            metavar="PATH=VALUES",
-            help="A path as for --set, and its values: A..B:N, both ends included, or v1,v2,...",
+            "A path as for --set, and its values: A..B:N, both ends included, or v1,v2,...",
+            "PATH=VALUES",
             autocompletion=setting_paths,
         ),
     ]
     samples: Annotated[
-        str | None,
-        typer.Option("--samples", metavar="N", help="So many of the combinations, drawn evenly by chance."),
+        str | None, option("--samples", "So many of the combinations, drawn evenly by chance.", "N")
     ] = None
-    seed: Annotated[
-        str | None, typer.Option("--seed", metavar="S", help="Of that chance.", show_default="0")
-    ] = None
+    seed: Annotated[str | None, option("--seed", "Of that chance.", "S", show_default="0")] = None
     count: Count = None
     engine: Annotated[
         Literal["process", "dask"],
-        typer.Option("--engine", help="Processes of this machine, or the workers of a Dask cluster."),
+        option("--engine", "Processes of this machine, or the workers of a Dask cluster."),
     ] = "process"
     scheduler: Scheduler = None
     timeout: Timeout = None
     output: Annotated[
-        str | None,
-        typer.Option("--output", "-o", metavar="FILE", help="FILE.csv or .jsonl; else CSV to stdout."),
+        str | None, option("--output -o", "FILE.csv or .jsonl; else CSV to stdout.", "FILE")
     ] = None
     plot: Annotated[
-        str | None,
-        typer.Option(
-            "--plot",
-            metavar="FILE",
-            help="FILE.svg, .png or .pdf: the durations, of two --vary as a map.",
-        ),
+        str | None, option("--plot", "FILE.svg, .png or .pdf: the durations, of two --vary as a map.", "FILE")
     ] = None
     best: Annotated[
         str | None,
-        typer.Option(
+        option(
             "--best",
-            metavar="COLUMN",
-            help="Say the verified row with the smallest number in a column; with -COLUMN the largest.",
+            "Say the verified row with the smallest number in a column; with -COLUMN the largest.",
+            "COLUMN",
         ),
     ] = None
-    strict: Annotated[bool, typer.Option("--strict", help="Exit 1 when a row is not verified.")] = False
-    force: Annotated[bool, typer.Option("--force", help="Plan points that are known, too.")] = False
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on stderr.")] = False
+    strict: Annotated[bool, option("--strict", "Exit 1 when a row is not verified.")] = False
+    force: Annotated[bool, option("--force", "Plan points that are known, too.")] = False
+    quiet: Annotated[bool, option("--quiet -q", "No summary on stderr.")] = False
 
 
 class RetimeCommand(EditCommand):
@@ -164,25 +145,15 @@ class RetimeCommand(EditCommand):
     example = "trajcli retime rows.csv --job examples/ur5e_pick.yaml -o slower.csv"
 
     file: MotionSource
-    job: Annotated[
-        str | None, typer.Option("--job", metavar="JOB", help="The job whose limits are kept.")
-    ] = None
+    job: Annotated[str | None, option("--job", "The job whose limits are kept.", "JOB")] = None
     robot: Annotated[
         str | None,
-        typer.Option(
-            "--robot",
-            "-r",
-            metavar="NAME|FILE",
-            help="The arm whose limits are kept.",
-            autocompletion=robot_names,
-        ),
+        option("--robot -r", "The arm whose limits are kept.", "NAME|FILE", autocompletion=robot_names),
     ] = None
     fastest: Annotated[
-        bool, typer.Option("--fastest", help="Also faster: over the shortest time that keeps the limits.")
+        bool, option("--fastest", "Also faster: over the shortest time that keeps the limits.")
     ] = False
-    per_move: Annotated[
-        bool, typer.Option("--per-move", help="A factor for each move, by the column `move`.")
-    ] = False
+    per_move: Annotated[bool, option("--per-move", "A factor for each move, by the column `move`.")] = False
 
 
 class ResampleCommand(EditCommand):
@@ -191,7 +162,7 @@ class ResampleCommand(EditCommand):
     example = "trajcli resample rows.csv --rate 500 -o coarse.csv"
 
     file: MotionSource
-    rate: Annotated[str, typer.Option("--rate", metavar="HZ", help="Rows per second.")]
+    rate: Annotated[str, option("--rate", "Rows per second.", "HZ")]
 
 
 class ConcatCommand(EditCommand):
@@ -199,10 +170,7 @@ class ConcatCommand(EditCommand):
 
     example = "trajcli concat there.csv back.csv -o both.csv"
 
-    files: Annotated[
-        list[str],
-        typer.Argument(metavar="FILE...", help="Motions, each of which begins where the last ends."),
-    ]
+    files: Annotated[list[str], argument("FILE...", "Motions, each of which begins where the last ends.")]
 
 
 class ReverseCommand(EditCommand):
@@ -219,12 +187,8 @@ class SliceCommand(EditCommand):
     example = "trajcli slice rows.csv --from 0.25 --to 0.75 -o part.csv"
 
     file: MotionSource
-    first: Annotated[
-        str | None, typer.Option("--from", metavar="T", help="Time of the file, s; else its start.")
-    ] = None
-    last: Annotated[
-        str | None, typer.Option("--to", metavar="T", help="Time of the file, s; else its end.")
-    ] = None
+    first: Annotated[str | None, option("--from", "Time of the file, s; else its start.", "T")] = None
+    last: Annotated[str | None, option("--to", "Time of the file, s; else its end.", "T")] = None
 
 
 class ConvertCommand(EditCommand):

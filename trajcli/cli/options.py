@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
+
+
+def option(names: str, text: str, metavar: str | None = None, **more: Any) -> Any:  # noqa: ANN401
+    """Return an option: its names, as "--output -o", its help, and what stands there for its value."""
+    return typer.Option(*names.split(), help=text, metavar=metavar, **more)
+
+
+def argument(metavar: str | None, text: str, **more: Any) -> Any:  # noqa: ANN401
+    """Return an argument: what stands for it in usage, and its help."""
+    return typer.Argument(help=text, metavar=metavar, **more)
 
 
 def robot_names(incomplete: str) -> list[str]:
@@ -43,101 +53,76 @@ def quantity_names(incomplete: str) -> list[str]:
     return quantities_that_begin(incomplete)
 
 
-JobFile = Annotated[str, typer.Argument(metavar="JOB", help="The job file; - is standard input.")]
+JobFile = Annotated[str, argument("JOB", "The job file; - is standard input.")]
 Overrides = Annotated[
     list[str],
-    typer.Option(
+    option(
         "--set",
-        metavar="PATH=VALUE",
-        help="Override a value of the job, such as moves.0.duration=3.",
+        "Override a value of the job, such as moves.0.duration=3.",
+        "PATH=VALUE",
         autocompletion=setting_paths,
     ),
 ]
 Consumer = Annotated[
     str | None,
-    typer.Option(
+    option(
         "--for",
-        metavar="PROFILE",
-        help="Plan for a consumer, such as ros-jtc, and judge the rows by its rules: `trajcli profiles`.",
+        "Plan for a consumer, such as ros-jtc, and judge the rows by its rules: `trajcli profiles`.",
+        "PROFILE",
         autocompletion=profile_words,
     ),
 ]
 RowTimes = Annotated[
     Literal["rate", "knots", "both"] | None,
-    typer.Option(
+    option(
         "--rows",
-        help="Rows at the times of the rate, at the knots of the curve, or at both.",
+        "Rows at the times of the rate, at the knots of the curve, or at both.",
         show_default="rate; of ROS messages knots",
     ),
 ]
-Errors = Annotated[
-    Literal["text", "json"], typer.Option("--errors", help="How errors are written to stderr.")
-]
+Errors = Annotated[Literal["text", "json"], option("--errors", "How errors are written to stderr.")]
 JobErrors = Annotated[
     Literal["text", "json", "github", "junit", "sarif"],
-    typer.Option(
+    option(
         "--errors",
-        help="How errors are written to stderr: for people, for programs, or for continuous integration.",
+        "How errors are written to stderr: for people, for programs, or for continuous integration.",
     ),
 ]
 RobotName = Annotated[
     str,
-    typer.Option(
-        "--robot",
-        "-r",
-        metavar="NAME|FILE",
-        help="A robot of the catalogue, a robot file, a URDF, or a job: its robot, base and tool.",
+    option(
+        "--robot -r",
+        "A robot of the catalogue, a robot file, a URDF, or a job: its robot, base and tool.",
+        "NAME|FILE",
         autocompletion=robot_names,
     ),
 ]
 Tool = Annotated[
     str | None,
-    typer.Option(
-        "--tool",
-        metavar="POSE",
-        help="T_flange_tcp as YAML or @FILE, instead of the robot's own or the job's.",
-    ),
+    option("--tool", "T_flange_tcp as YAML or @FILE, instead of the robot's own or the job's.", "POSE"),
 ]
 Base = Annotated[
     str | None,
-    typer.Option(
-        "--base",
-        metavar="POSE",
-        help="T_world_base as YAML or @FILE, instead of the robot's own or the job's.",
-    ),
+    option("--base", "T_world_base as YAML or @FILE, instead of the robot's own or the job's.", "POSE"),
 ]
 ArmUnits = Annotated[
-    str | None,
-    typer.Option(
-        "--units", metavar="UNITS", help="Of numbers, such as deg,mm; else those of the robot's file."
-    ),
+    str | None, option("--units", "Of numbers, such as deg,mm; else those of the robot's file.", "UNITS")
 ]
-Si = Annotated[bool, typer.Option("--si", help="Numbers in rad and m, whatever units the robot's file has.")]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+Si = Annotated[bool, option("--si", "Numbers in rad and m, whatever units the robot's file has.")]
+Json = Annotated[bool, option("--json", "Print JSON for programs.")]
 Joints = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="Q...", help="A value for each joint, in the units of the robot's file; - reads a CSV."
-    ),
+    list[str], argument("Q...", "A value for each joint, in the units of the robot's file; - reads a CSV.")
 ]
 DigitsOption = Annotated[
-    Literal["fixed", "full"],
-    typer.Option("--digits", help="Of a CSV. fixed: nine decimals; full: every bit."),
+    Literal["fixed", "full"], option("--digits", "Of a CSV. fixed: nine decimals; full: every bit.")
 ]
 MotionForm = Annotated[
     Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"] | None,
-    typer.Option("--format", help="Of stdout, and which message a .yaml holds.", show_default="csv"),
+    option("--format", "Of stdout, and which message a .yaml holds.", show_default="csv"),
 ]
 ColumnMap = Annotated[
-    str | None,
-    typer.Option("--columns", metavar="MAP", help="What columns are: t=timestamp,q=target_q,qd=target_qd."),
+    str | None, option("--columns", "What columns are: t=timestamp,q=target_q,qd=target_qd.", "MAP")
 ]
-FileUnits = Annotated[
-    str | None, typer.Option("--units", metavar="UNITS", help="Of columns that name none, such as deg,mm.")
-]
-TopicName = Annotated[
-    str | None, typer.Option("--topic", metavar="T", help="MCAP: the topic.", show_default="/joint_states")
-]
-FieldName = Annotated[
-    str | None, typer.Option("--field", metavar="F", help="Of messages with several states: the one meant.")
-]
+FileUnits = Annotated[str | None, option("--units", "Of columns that name none, such as deg,mm.", "UNITS")]
+TopicName = Annotated[str | None, option("--topic", "MCAP: the topic.", "T", show_default="/joint_states")]
+FieldName = Annotated[str | None, option("--field", "Of messages with several states: the one meant.", "F")]

@@ -48,14 +48,8 @@ def _outcome(run: Callable[[Any], int], options: Any, form: ErrorForm) -> int:  
         return report_bug(error, form)
 
 
-def report_error(error: TrajcliError, form: ErrorForm = "text", file: str | None = None) -> None:
-    """Print an error on standard error, for people or for programs.
-
-    Args:
-        error: What is wrong.
-        form: For people, as JSON, or for a service of continuous integration.
-        file: What it is about, for services, where it has no place in a file.
-    """
+def report_error(error: TrajcliError, form: ErrorForm = "text") -> None:
+    """Print an error on standard error, for people, as JSON, or for a service of continuous integration."""
     if form == "json":
         import json
 
@@ -64,7 +58,7 @@ def report_error(error: TrajcliError, form: ErrorForm = "text", file: str | None
     if form != "text":
         from trajcli.output.annotations import annotations_of, render_annotations
 
-        print(render_annotations(annotations_of(error, file), form), end="", file=sys.stderr)  # noqa: T201
+        print(render_annotations(annotations_of(error), form), end="", file=sys.stderr)  # noqa: T201
         return
     from trajcli.cli.frames import render_problem
     from trajcli.cli.terminal import columns, is_coloured

@@ -11,7 +11,7 @@ import numpy as np
 
 from trajcli.cli.outcome import print_remark, print_text
 from trajcli.cli.progress import is_terminal, progress
-from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
+from trajcli.errors import Amount, InputError, TrajcliError, VerificationError
 from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.output.write import grid_of, write_rows, write_text
@@ -51,7 +51,9 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
 
         check_log_options(log, loaded.robot, loaded.job.output.start_time)
     if options.resolved is not None:
-        _write_resolved(loaded, options.resolved)
+        from trajcli.job.dump import dump_job
+
+        write_text(dump_job(loaded), options.resolved)
     table = _shows_table(options)
     with (
         _older_rows_aside(options),
@@ -162,17 +164,7 @@ def _contradicted(plan: Plan) -> VerificationError | None:
 
     found = contradictions_of(plan.trajectory.spans, [reference_of(move) for move in plan.moves])
     problems = [
-        Problem(
-            f"{_where(plan, one.move)}{one.message}",
-            one.hint,
-            place=plan.loaded.place_of_move(one.move or 0),
-            move=one.move,
-            joint=one.joint,
-            time=one.time,
-            value=one.value,
-            limit=one.limit,
-            kind="reference",
-        )
+        one.problem(f"{_where(plan, one.move)}{one.message}", plan.loaded.place_of_move(one.move or 0))
         for one in found
     ]
     return VerificationError(*problems) if problems else None
@@ -264,12 +256,6 @@ def _check_inputs_stay(loaded: LoadedJob, options: PlanCommand) -> None:
             raise InputError(f"{name} to {path} would overwrite {read[same]}", hint="name another file")
 
 
-def _write_resolved(loaded: LoadedJob, path: str) -> None:
-    from trajcli.job.dump import dump_job
-
-    write_text(dump_job(loaded), path)
-
-
 def _report(
     plan: Plan,
     options: PlanCommand,
@@ -296,20 +282,20 @@ def _report(
         if move.reference is not None:
             text = _compared(move, move.reference)
             print_remark(f"move {move.index} ({move.planner}): {text}")
-        for line in peer_lines(in_units(move, plan.loaded.units), "  "):
+        for line in peer_lines(in_units(move, plan.loaded.units)):
             print_remark(line)
 
 
-def peer_lines(move: MoveReport, indent: str) -> Iterator[str]:
+def peer_lines(move: MoveReport) -> Iterator[str]:
     """Yield how a move compares with toppra along its path, and which limits the peers break."""
     if move.path_reference is not None:
-        yield f"{indent}{_beside_toppra(move, move.path_reference)}"
-        yield from violation_lines("toppra", move.path_reference.violations, indent)
+        yield f"  {_beside_toppra(move, move.path_reference)}"
+        yield from violation_lines("toppra", move.path_reference.violations)
     if move.reference is not None:
-        yield from violation_lines("ruckig", move.reference.violations, indent)
+        yield from violation_lines("ruckig", move.reference.violations)
 
 
-def violation_lines(peer: str, violations: Sequence[PeerViolation], indent: str) -> Iterator[str]:
+def violation_lines(peer: str, violations: Sequence[PeerViolation]) -> Iterator[str]:
     """Yield the worst limit that a peer breaks, and how many more."""
     if not violations:
         return
@@ -318,7 +304,7 @@ def violation_lines(peer: str, violations: Sequence[PeerViolation], indent: str)
     )
     more = f", and {len(violations) - 1} more" if len(violations) > 1 else ""
     reached = f"{worst.value:.9g} {worst.unit}, its limit is {worst.limit:.9g}"
-    yield f"{indent}{peer} breaks a limit: the {worst.quantity} of {worst.joint} reaches {reached}{more}"
+    yield f"  {peer} breaks a limit: the {worst.quantity} of {worst.joint} reaches {reached}{more}"
 
 
 def _compared(move: MoveReport, bound: ReferenceReport) -> str:

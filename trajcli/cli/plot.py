@@ -59,7 +59,8 @@ def run_plot(options: PlotCommand) -> int:
         judgements = [None if checked is None else checked.judgement for checked in judged]
         picture = picture_of(plan, tables, wanted, joints, judgements, second)
         _write(rendered(picture, kind), target)
-    _say_written(target, options)
+    if target != "-" and not options.quiet:
+        print_remark(f"{target} written")
     _refuse_findings(plans, judged, options)
     return 0
 
@@ -167,8 +168,3 @@ def _check_inputs_stay(plans: Sequence[Plan], rows: Sequence[str], target: str) 
 def _write(content: bytes, target: str) -> None:
     with standard_output() if target == "-" else whole_file(target) as out:
         out.write(content)
-
-
-def _say_written(target: str, options: PlotCommand) -> None:
-    if target != "-" and not options.quiet:
-        print_remark(f"{target} written")

@@ -66,7 +66,10 @@ def run_pose(options: PoseCommand) -> int:
     if options.as_json:
         print_json(reports)
     else:
-        print_lines(line for report in reports for line in _point_lines(report, units, options))
+        lines: list[str] = []
+        for report in reports:
+            lines += [f"s = {number(report['s'])}", *(f"  {line}" for line in _lines(report, units, options))]
+        print_lines(lines)
     return 0
 
 
@@ -109,8 +112,3 @@ def _lines(report: dict[str, Any], units: Units, options: PoseCommand, defect: f
         yield f"point ({units.length}): {numbers(report['point'])}"
     for name, text in report.get("singular", {}).items():
         yield f"{name}: {text}"
-
-
-def _point_lines(report: dict[str, Any], units: Units, options: PoseCommand) -> Iterator[str]:
-    yield f"s = {number(report['s'])}"
-    yield from ("  " + line for line in _lines(report, units, options))

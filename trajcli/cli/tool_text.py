@@ -149,15 +149,12 @@ def pose_lines(move: ExplainedMove) -> Iterator[str]:
         if pose is not None:
             units = ", ".join(dict.fromkeys(pose.units))
             yield f"  {head}: joints {numbers(pose.joints)} ({units})"
-            yield f"    branch: {_branch(pose)}; {_singular(pose)}"
+            branch = _named(pose.branch) if pose.branch else f"without a name ({pose.method})"
+            yield f"    branch: {branch}; {_singular(pose)}"
             yield f"    chosen: {_choice(pose.chosen, origin)}"
             if pose.free_direction is not None:
                 along = numbers(pose.free_direction)
                 yield f"    the arm can move without leaving the pose: joints along {along}"
-
-
-def _branch(pose: PoseReport) -> str:
-    return _named(pose.branch) if pose.branch else f"without a name ({pose.method})"
 
 
 def _named(names: Mapping[str, str]) -> str:

@@ -111,18 +111,14 @@ def _at(motion: EditedMotion, times: Array) -> EditedMotion:
 def _between_rows(motion: EditedMotion, times: Array) -> dict[str, Array]:
     """Return all quantities at times between rows: of the curve, what it takes from them, others linear."""
     rows, curve = motion.rows, motion.curve()
+    of_curve = ORDERS[: 1 + (rows.qd is not None) * (1 + (rows.qdd is not None))]
     found = {}
     for name, values in motion.quantities.items():
-        if name in _of_curve(motion):
+        if name in of_curve:
             found[name] = curve.evaluate(times, ORDERS.index(name))
         else:
             found[name] = np.stack([np.interp(times, rows.t, column) for column in values.T], axis=1)
     return found
-
-
-def _of_curve(motion: EditedMotion) -> tuple[str, ...]:
-    rows = motion.rows
-    return ORDERS[: 1 + (rows.qd is not None) * (1 + (rows.qdd is not None))]
 
 
 def join(first: EditedMotion, second: EditedMotion) -> EditedMotion:

@@ -231,17 +231,13 @@ class _Moves:
         except ValidationError:
             if len(once) == len(value):
                 raise
-            stood = [_tagged(e) if first[id(e)] == n else _Moves._stand_in() for n, e in enumerate(value)]
+            stand_in = HANDLING["detach"].model_construct()  # for each that is read already
+            stood = [_tagged(e) if first[id(e)] == n else stand_in for n, e in enumerate(value)]
             return _validated(stood, info.context)  # for the places of the flaws
         if len(once) == len(value):
             return moves
         known = dict(zip(first, moves, strict=True))
         return [known[id(entry)] for entry in value]
-
-    @staticmethod
-    def _stand_in() -> Planner:
-        """Return a move without flaws, in the place of one that is read already."""
-        return HANDLING["detach"].model_construct()
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

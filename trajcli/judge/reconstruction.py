@@ -87,12 +87,7 @@ def piece_coefficients(
         return clamped(times, q, standing, standing).coefficients
     if interpolation == "jtc":
         return _by_segment(lengths, q, qd, qdd)
-    stated = [rows for rows in (q, qd, qdd)[: _STATED[interpolation]] if rows is not None]
-    return _hermite(lengths, stated)
-
-
-def _hermite(lengths: Array, stated: list[Array]) -> Array:
-    rows = np.stack(stated)
+    rows = np.stack([rows for rows in (q, qd, qdd)[: _STATED[interpolation]] if rows is not None])
     return hermite_coefficients(rows[:, :-1], rows[:, 1:], lengths[:, None])
 
 

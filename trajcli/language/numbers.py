@@ -226,7 +226,8 @@ def number_schema(quantity: Quantity, **stated: float) -> JsonSchemaValue:
 
 def _least(quantity: Quantity) -> float:
     """Return the smallest number above zero, SI, that a number of a quantity may be."""
-    return SMALLEST_DISTANCE if _is_distance(quantity) else SMALLEST
+    is_distance = quantity.dimension in ("angle", "length") and quantity.order == 0
+    return SMALLEST_DISTANCE if is_distance else SMALLEST
 
 
 def within_bounds(number: float, value: object, quantity: Quantity, units: Units) -> float:
@@ -260,10 +261,6 @@ def check_not_tiny(number: float, value: object, quantity: Quantity, units: Unit
     if 0 < number < least:
         bound = f"{least / factor(quantity, units):.6g} {unit_name(quantity, units)}".rstrip()
         raise FlawError(f"expected at least {bound}, got {shown(value)}", hint=_BEYOND_ANY_ROBOT)
-
-
-def _is_distance(quantity: Quantity) -> bool:
-    return quantity.dimension in ("angle", "length") and quantity.order == 0
 
 
 def written_number(value: float, quantity: Quantity) -> float | str:

@@ -98,7 +98,8 @@ def _github(problem: Problem) -> str:
     if place.file in _STANDARD_INPUT:
         given = {}
     given["title"] = f"trajcli: {problem.kind}"
-    pairs = (f"{key}={_github_property(str(value))}" for key, value in given.items() if value)
+    texts = ((key, _github_data(str(value))) for key, value in given.items() if value)
+    pairs = (f"{key}={text.replace(':', '%3A').replace(',', '%2C')}" for key, text in texts)
     return f"::{kind} {','.join(pairs)}::{_github_data(problem.message)}"
 
 
@@ -111,10 +112,6 @@ def _github_data(text: str) -> str:
 def _encodable(text: str) -> str:
     """Return a text with what UTF-8 cannot hold as escapes."""
     return text.encode("utf-8", "backslashreplace").decode()
-
-
-def _github_property(text: str) -> str:
-    return _github_data(text).replace(":", "%3A").replace(",", "%2C")
 
 
 def _escaped(match: re.Match[str]) -> str:

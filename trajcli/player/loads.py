@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
-from trajcli.kinematics.robot import Payload
 from trajcli.planning.plan import Plan
 from trajcli.player.rows import DrawnRows
 
@@ -43,11 +42,8 @@ def shows_efforts(plan: Plan) -> bool:
     robot = plan.loaded.robot
     if robot.convention is None or robot.without_inertia:
         return False
-    return any(move.robot.limits.has_effort or _carries(move.robot.payload) for move in plan.moves)
-
-
-def _carries(payload: Payload | None) -> bool:
-    return payload is not None and payload.mass > 0
+    robots = [move.robot for move in plan.moves]
+    return any(each.limits.has_effort or (each.payload and each.payload.mass > 0) for each in robots)
 
 
 def efforts_of_rows(plan: Plan, rows: DrawnRows) -> Array:

@@ -138,17 +138,13 @@ def _draw_block(
         view = _plane_view(panel) if times is None else view_of(panel)
         frame = PanelFrame(sheet, box, times or _plane_range(panel), view, f"panel{number + index}")
         if times is not None and borders is not None:
-            _draw_borders(frame, borders)
+            if 2 < borders.times.size <= MOST_BORDERS:
+                frame.uprights(borders.times[1:-1], "borders", **BORDER)
             if row == 0:
                 _draw_indices(frame, borders)
         lowest = index + block.columns >= len(block.panels)
         note = "" if times is None else note_of(panel, view)
         _draw_panel(frame, panel, note, numbered=times is None or lowest)
-
-
-def _draw_borders(frame: PanelFrame, borders: MoveBorders) -> None:
-    if 2 < borders.times.size <= MOST_BORDERS:
-        frame.uprights(borders.times[1:-1], "borders", **BORDER)
 
 
 def _draw_indices(frame: PanelFrame, borders: MoveBorders) -> None:

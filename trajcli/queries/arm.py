@@ -275,10 +275,6 @@ class LimitWatch:
         self.remark: str | None = None
         self._robot = robot
 
-    def see_tool(self, off: float) -> None:
-        """Count how far the tcp of the next rows is from where they say, m."""
-        self.tool_off = max(self.tool_off, off)
-
     def see(
         self,
         values: Array,

@@ -106,7 +106,8 @@ def _poses(
         last = quaternions[-1]
         if known and watch is not None:
             stated = np.stack([block[:, i] * unit for i, unit in known], axis=1)
-            watch.see_tool(float(np.linalg.norm(stated - poses[:, :3, 3], axis=1).max()))
+            off = float(np.linalg.norm(stated - poses[:, :3, 3], axis=1).max())
+            watch.tool_off = max(watch.tool_off, off)
         yield np.hstack([inputs.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
 
 

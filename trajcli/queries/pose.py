@@ -85,17 +85,8 @@ def read_steps(words: Sequence[str], units: Units) -> list[PoseStep]:
         FileError: When a file cannot be read.
     """
     names = ["STEP"] if len(words) == 1 else [f"STEP {number}" for number in range(1, len(words) + 1)]
-    return [read_step(word, name, units) for word, name in zip(words, names, strict=True)]
-
-
-def read_step(word: str, name: str, units: Units) -> PoseStep:
-    """Return the step that one word describes; `name` is what messages call it.
-
-    Raises:
-        InputError: When it is no step.
-        FileError: When its file cannot be read.
-    """
-    return read_at(inline_document(word, name), units, _step)
+    documents = [inline_document(word, name) for word, name in zip(words, names, strict=True)]
+    return [read_at(document, units, _step) for document in documents]
 
 
 def read_end(word: str, name: str, units: Units) -> PoseStep:

@@ -58,7 +58,7 @@ def read_header(stream: BinaryIO, file: str) -> tuple[Header, bytes]:
     line, number, text = _line(stream, file), 1, b""
     while line.lstrip().startswith(_COMMENT) and number < _MOST_COMMENTS:
         text = _line(stream, file, number + 1)
-        if not text.lstrip().startswith(_COMMENT) and (not text.strip() or _is_row(text)):
+        if not text.lstrip().startswith(_COMMENT) and (not text.strip() or _NUMBER.match(text.lstrip())):
             break  # the comment is the line of names
         line, text, number = text, b"", number + 1
     header = _decoded(line, file)
@@ -86,11 +86,6 @@ def _decoded(line: bytes, file: str) -> str:
     if any(byte < 9 or 0x80 <= byte < 0xA0 for byte in line):  # no letters in any code of a byte each
         raise InputError(f"{file} is not text", hint="a CSV begins with a line of the columns' names")
     return line.decode("latin-1").rstrip("\r\n")
-
-
-def _is_row(line: bytes) -> bool:
-    """Return whether a line begins with a number."""
-    return bool(_NUMBER.match(line.lstrip()))
 
 
 def _names(text: str) -> tuple[str, ...]:

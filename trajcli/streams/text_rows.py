@@ -154,7 +154,8 @@ class RowReader:
         texts = {b",".join(line[index] for index in self._fixed) for line in lines}
         if not np.isfinite(rows).all() or len(texts) > 1:
             self._explain(written, layout)
-        self.decimals = np.maximum(self.decimals, _most_decimals(cells))
+        shown = [max(map(decimals_of, column)) for column in zip(*cells, strict=True)]
+        self.decimals = np.maximum(self.decimals, shown)
         return rows
 
     def _split(self, line: bytes) -> list[bytes]:
@@ -179,7 +180,10 @@ class RowReader:
     def _flaw_of(self, line: bytes, number: int, layout: RowLayout) -> tuple[str, str | None, Place] | None:
         """Return what is wrong with a line, what would fix it, and where; None where nothing is."""
         source, names = line.decode("utf-8", "replace"), self._header.names
-        cells = layout.cells(source) if '"' not in source else list(enumerate(self._text_cells(line), 1))
+        if '"' in source:
+            cells = list(enumerate((cell.decode("latin-1") for cell in self._split(line)), 1))
+        else:
+            cells = layout.cells(source)
         if len(cells) != len(names):
             place = Place(
                 self._header.file, number, 1, _shown_line(line), max(min(len(source), _SHOWN_LINE), 1)
@@ -198,9 +202,6 @@ class RowReader:
                 value = f"'{shown}'" if shown else "empty"
                 return f"{names[index]} is {value}, expected a finite number", None, place
         return None
-
-    def _text_cells(self, line: bytes) -> list[str]:
-        return [cell.decode("latin-1") for cell in self._split(line)]
 
 
 def _cells_of(
@@ -223,8 +224,3 @@ def _number(cell: bytes) -> float:
 def _shown_line(line: bytes) -> str:
     text = line.decode("utf-8", "replace")
     return text if len(text) <= _SHOWN_LINE else text[:_SHOWN_LINE]
-
-
-def _most_decimals(cells: Sequence[Sequence[bytes]]) -> NDArray[np.int64]:
-    """Return how many decimals the numbers of each column show at most, shape (m,)."""
-    return np.array([max(map(decimals_of, column)) for column in zip(*cells, strict=True)])

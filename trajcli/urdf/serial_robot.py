@@ -150,7 +150,9 @@ def robot_of_urdf(
     properties = [joint_properties(document, joint, soft=soft) for joint in moving]
     origins, table = origins_and_table(document, path, exact=exact)
     notes = [note for each in properties for note in each.notes]
-    inertias = _inertias(document, path, origins, table, notes)
+    # what is not of the chain, such as a gripper, is fixed where its joints are at zero
+    behind = links_of_rows(document, path, origins, table)[1:]
+    inertias = [link_inertia(document, parts, notes) for parts in behind]
     robot = _robot(document, moving, table, properties, inertias)
     snapped = () if exact else tuple(_snapped(document, path, origins, properties))
     return UrdfRobot(robot, path.root, path.tip, path.other_tips, path.other_roots, snapped, tuple(notes))
@@ -236,21 +238,6 @@ def _limits(document: UrdfDocument, bounds: tuple[Array, Array, Array, Array], b
         return Limits(*bounds, velocity_by_position=by_position)
     except ValueError as error:
         raise InputError(Problem(str(error), place=Place(document.file, 1, 1))) from None
-
-
-def _inertias(
-    document: UrdfDocument,
-    path: SerialPath,
-    origins: Sequence[Array],
-    table: DhTable,
-    notes: list[str],
-) -> list[LinkInertia | None]:
-    """Return the inertia behind each joint that moves, in the frame of its row.
-
-    What is not of the chain, such as a gripper, is fixed where its joints are at zero.
-    """
-    behind = links_of_rows(document, path, origins, table)[1:]
-    return [link_inertia(document, parts, notes) for parts in behind]
 
 
 def links_of_rows(
