@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, SerializerFunctionWrapHandler, TypeAdapter, model_serializer
+from pydantic import SerializerFunctionWrapHandler, TypeAdapter, model_serializer
 
 from trajcli.job.report import MoveReport, OutsideReport, Report, WaypointReport
-from trajcli.job.reports.part import MeasuredIn, ReportPart, UnitName
+from trajcli.job.reports.part import MeasuredIn, ReportPart, UnitName, described
 
 Vector = list[float]
-MoveSeconds = Annotated[float, Field(description="Seconds from the start of the move.")]
+MoveSeconds = Annotated[float, described("Seconds from the start of the move.")]
 
 
 class PolynomialReport(ReportPart):
@@ -20,36 +20,28 @@ class PolynomialReport(ReportPart):
 
     start: MoveSeconds
     end: MoveSeconds
-    local: Annotated[
-        Vector, MeasuredIn(), Field(description="Coefficients in powers of t - start, ascending.")
-    ]
-    absolute: Annotated[Vector, MeasuredIn(), Field(description="Coefficients in powers of t, ascending.")]
+    local: Annotated[Vector, MeasuredIn(), described("Coefficients in powers of t - start, ascending.")]
+    absolute: Annotated[Vector, MeasuredIn(), described("Coefficients in powers of t, ascending.")]
     unshifted: Annotated[
         Vector | None,
         MeasuredIn(),
-        Field(
-            description="Coefficients in powers of t - origin: the times of the job. Null without a shift."
-        ),
+        described("Coefficients in powers of t - origin: the times of the job. Null without a shift."),
     ] = None
     velocity: Annotated[
         Vector | None,
         MeasuredIn(),
-        Field(
-            description="Coefficients of the first derivative in powers of t, where asked for; unit per s."
-        ),
+        described("Coefficients of the first derivative in powers of t, where asked for; unit per s."),
     ] = None
     acceleration: Annotated[
         Vector | None,
         MeasuredIn(),
-        Field(
-            description="Coefficients of the second derivative in powers of t, where asked for; unit per s^2."
-        ),
+        described("Coefficients of the second derivative in powers of t, where asked for; unit per s^2."),
     ] = None
     in_pi: Annotated[
         list[str | None] | None,
-        Field(
-            description="The coefficients `absolute` as multiples of pi, such as 3 pi/2; null for each that "
-            "is none, and for all where none is, or the unit is not rad."
+        described(
+            "The coefficients `absolute` as multiples of pi, such as 3 pi/2; null for each that is "
+            "none, and for all where none is, or the unit is not rad."
         ),
     ] = None
     unit: UnitName
@@ -77,11 +69,11 @@ class ChoiceReport(ReportPart):
     """Why a pose is reached on its branch and not on another."""
 
     by: Literal["configuration", "nearest"]
-    configuration: Annotated[dict[str, str], Field(description="The names that the job asks for.")]
-    near: Annotated[Vector, MeasuredIn("units"), Field(description="Where the arm comes from.")]
+    configuration: Annotated[dict[str, str], described("The names that the job asks for.")]
+    near: Annotated[Vector, MeasuredIn("units"), described("Where the arm comes from.")]
     units: list[str]
-    candidates: Annotated[int, Field(description="Answers within the limits that have these names.")]
-    within_limits: Annotated[int, Field(description="Answers within the limits.")]
+    candidates: Annotated[int, described("Answers within the limits that have these names.")]
+    within_limits: Annotated[int, described("Answers within the limits.")]
 
 
 class PoseReport(_Sparse):
@@ -97,12 +89,12 @@ class PoseReport(_Sparse):
     method: str
     chosen: ChoiceReport
     singular: bool
-    rank: Annotated[dict[str, int], Field(description="Numbers of these directions.")]
+    rank: Annotated[dict[str, int], described("Numbers of these directions.")]
     free_direction: Annotated[
         Vector | None,
-        Field(
-            description="Unit vector of joint values in the units of the job, along which the arm can move "
-            "while the tcp keeps the pose."
+        described(
+            "Unit vector of joint values in the units of the job, along which the arm can move while "
+            "the tcp keeps the pose."
         ),
     ] = None
 
@@ -174,7 +166,7 @@ class CornerReport(ReportPart):
     """A corner between two segments."""
 
     kind: str
-    place: Annotated[float, MeasuredIn(), Field(description="s on the path.")]
+    place: Annotated[float, MeasuredIn(), described("s on the path.")]
     point: Annotated[Vector, MeasuredIn()]
     turn: Annotated[float, MeasuredIn("turn_unit")]
     radius: Annotated[float, MeasuredIn()]
@@ -187,11 +179,11 @@ class WeaveReport(ReportPart):
     """A swing to both sides of the path, which is then its seam: length, segments and s are of that."""
 
     shape: Literal["sine", "triangle", "trapezoid"]
-    amplitude: Annotated[float, MeasuredIn(), Field(description="To each side.")]
+    amplitude: Annotated[float, MeasuredIn(), described("To each side.")]
     lengths: Annotated[
-        Vector, MeasuredIn(), Field(description="Of a cycle, for each part of the seam between stops.")
+        Vector, MeasuredIn(), described("Of a cycle, for each part of the seam between stops.")
     ]
-    cycles: Annotated[list[float], Field(description="For each of these parts, whole or half ones.")]
+    cycles: Annotated[list[float], described("For each of these parts, whole or half ones.")]
     unit: UnitName = "m"
 
 
@@ -223,7 +215,7 @@ class KnotReport(ReportPart):
     """A knot of a spline with virtual points: a point that it passes, or a virtual one."""
 
     time: MoveSeconds
-    virtual: Annotated[bool, Field(description="Whether its position follows from the spline.")]
+    virtual: Annotated[bool, described("Whether its position follows from the spline.")]
     position: Annotated[Vector, MeasuredIn("units")]
     velocity: Annotated[Vector, MeasuredIn("velocity_units")]
     acceleration: Annotated[Vector, MeasuredIn("acceleration_units")]
@@ -238,12 +230,12 @@ class BlendReport(ReportPart):
     Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), section 4.2.2.
     """
 
-    index: Annotated[int, Field(description="Of the point among the waypoints, the start being 0.")]
+    index: Annotated[int, described("Of the point among the waypoints, the start being 0.")]
     joint: str
-    time: Annotated[float, Field(description="t_k, when the job would pass the point, s.")]
-    start: Annotated[float, Field(description="Where the parabola begins, s in the times of the job.")]
-    end: Annotated[float, Field(description="Where it ends, s in the times of the job.")]
-    coefficients: Annotated[Vector, MeasuredIn(), Field(description="b0, b1 and b2.")]
+    time: Annotated[float, described("t_k, when the job would pass the point, s.")]
+    start: Annotated[float, described("Where the parabola begins, s in the times of the job.")]
+    end: Annotated[float, described("Where it ends, s in the times of the job.")]
+    coefficients: Annotated[Vector, MeasuredIn(), described("b0, b1 and b2.")]
     unit: UnitName
 
 
@@ -254,22 +246,22 @@ class ExplainedMove(MoveReport):
     from_pose: PoseReport | None
     to_pose: PoseReport | None
     breaks: list[MoveSeconds]
-    polynomials: Annotated[dict[str, list[PolynomialReport]], Field(description="By the name of the joint.")]
-    closed_form: Annotated[dict[str, str] | None, Field(description="Formulas of which these are a fit.")]
+    polynomials: Annotated[dict[str, list[PolynomialReport]], described("By the name of the joint.")]
+    closed_form: Annotated[dict[str, str] | None, described("Formulas of which these are a fit.")]
     closed_form_derivatives: Annotated[
         dict[str, list[str]] | None,
-        Field(description="Of these formulas the first and second derivative, where asked for."),
+        described("Of these formulas the first and second derivative, where asked for."),
     ] = None
     knots: Annotated[
-        list[KnotReport] | None, Field(description="Of a spline with virtual points; null for others.")
+        list[KnotReport] | None, described("Of a spline with virtual points; null for others.")
     ] = None
-    blends: Annotated[
-        list[BlendReport] | None, Field(description="Parabolas about the points that they round.")
-    ] = None
+    blends: Annotated[list[BlendReport] | None, described("Parabolas about the points that they round.")] = (
+        None
+    )
     phases: list[PhaseReport]
-    binding_phases: Annotated[bool, Field(description="Whether the phases say which limit binds.")]
-    arrivals: Annotated[dict[str, float] | None, Field(description="Durations of each joint alone, s.")]
-    origin: Annotated[float, Field(description="Where the zero of the move's own time lies, s.")]
+    binding_phases: Annotated[bool, described("Whether the phases say which limit binds.")]
+    arrivals: Annotated[dict[str, float] | None, described("Durations of each joint alone, s.")]
+    origin: Annotated[float, described("Where the zero of the move's own time lies, s.")]
     waypoints: tuple[ExplainedWaypoint, ...] | None = None
     outside: tuple[ExplainedOutside, ...] | None = None
     path: PathReport | None

@@ -19,7 +19,17 @@ from trajcli.job.reports.comparisons import (
 )
 from trajcli.job.reports.efforts import EffortReport, EffortsReport, MountedToolReport, PayloadReport
 from trajcli.job.reports.flyby import FlyByReport, SignalReport
-from trajcli.job.reports.part import JointQuantity, MeasuredIn, ReportPart, ReportSeconds, UnitName, in_units
+from trajcli.job.reports.part import (
+    InSi,
+    JointQuantity,
+    MeasuredIn,
+    ReportPart,
+    ReportSeconds,
+    TrajectorySeconds,
+    UnitName,
+    described,
+    in_units,
+)
 from trajcli.limits.kinds import ToolLimit
 
 __all__ = ["MeasuredIn", "Report", "ReportPart", "UnitName", "in_units"]
@@ -30,18 +40,14 @@ class PeakReport(ReportPart):
 
     joint: str
     quantity: JointQuantity
-    low: Annotated[float, MeasuredIn(), Field(description="Smallest value, SI.")]
-    low_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-    high: Annotated[float, MeasuredIn(), Field(description="Largest value, SI.")]
-    high_time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+    low: Annotated[float, MeasuredIn(), described("Smallest value, SI.")]
+    low_time: Annotated[float, described("Where it is, seconds from the start of the trajectory.")]
+    high: Annotated[float, MeasuredIn(), described("Largest value, SI.")]
+    high_time: Annotated[float, described("Where it is, seconds from the start of the trajectory.")]
     limit: Annotated[
-        tuple[float | None, float | None],
-        MeasuredIn(),
-        Field(description="Bounds, SI; null is unlimited."),
+        tuple[float | None, float | None], MeasuredIn(), described("Bounds, SI; null is unlimited.")
     ]
-    used: Annotated[
-        float | None, Field(description="Largest part of the bound that is used; null if unlimited.")
-    ]
+    used: Annotated[float | None, described("Largest part of the bound that is used; null if unlimited.")]
     unit: UnitName
 
 
@@ -49,47 +55,41 @@ class ByPositionReport(ReportPart):
     """Where a joint uses most of its limit of velocity by position in one move."""
 
     joint: str
-    used: Annotated[float, Field(description="Largest part of the limit that is used.")]
-    velocity: Annotated[float, MeasuredIn(), Field(description="There, SI.")]
-    limit: Annotated[float, MeasuredIn(), Field(description="There, with the sign of the velocity, SI.")]
+    used: Annotated[float, described("Largest part of the limit that is used.")]
+    velocity: Annotated[float, MeasuredIn(), described("There, SI.")]
+    limit: Annotated[float, MeasuredIn(), described("There, with the sign of the velocity, SI.")]
     unit: UnitName
-    distance: Annotated[
-        float, MeasuredIn("distance_unit"), Field(description="To the position limit ahead, SI.")
-    ]
+    distance: Annotated[float, MeasuredIn("distance_unit"), described("To the position limit ahead, SI.")]
     distance_unit: UnitName
-    time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
+    time: Annotated[float, described("Where it is, seconds from the start of the trajectory.")]
 
 
 class BindingReport(ReportPart):
     """The limit of which a move uses most."""
 
-    joint: Annotated[str | None, Field(description="Null: the quantity is of the tool.")]
+    joint: Annotated[str | None, described("Null: the quantity is of the tool.")]
     quantity: JointQuantity | Literal["velocity_by_position", "effort"] | ToolLimit
-    used: Annotated[float, Field(description="Part of the bound that is used: 1 is all of it.")]
+    used: Annotated[float, described("Part of the bound that is used: 1 is all of it.")]
 
 
 class WaypointReport(ReportPart):
     """A point that a move passes, its start and target among them."""
 
-    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    time: TrajectorySeconds
     missed: Annotated[
         list[float],
         MeasuredIn("units"),
-        Field(description="Distance at which each joint passes it, SI; zero where it goes through."),
+        described("Distance at which each joint passes it, SI; zero where it goes through."),
     ]
-    units: Annotated[list[str], Field(description="Unit of each joint.")]
+    units: Annotated[list[str], described("Unit of each joint.")]
 
 
 class OutsideReport(ReportPart):
     """How far a joint leaves the range that the waypoints of a move span."""
 
     joint: str
-    beyond: Annotated[
-        float, MeasuredIn(), Field(description="Above (positive) or below (negative) that range, SI.")
-    ]
-    time: Annotated[
-        float, Field(description="Where it is furthest, seconds from the start of the trajectory.")
-    ]
+    beyond: Annotated[float, MeasuredIn(), described("Above (positive) or below (negative) that range, SI.")]
+    time: Annotated[float, described("Where it is furthest, seconds from the start of the trajectory.")]
     unit: UnitName
 
 
@@ -97,8 +97,8 @@ class OffChordReport(ReportPart):
     """How far a joint leaves the straight chords between the points of a move."""
 
     joint: str
-    distance: Annotated[float, MeasuredIn(), Field(description="At most, SI.")]
-    time: Annotated[float, Field(description="Where, seconds from the start of the trajectory.")]
+    distance: Annotated[float, MeasuredIn(), described("At most, SI.")]
+    time: Annotated[float, described("Where, seconds from the start of the trajectory.")]
     unit: UnitName
 
 
@@ -106,29 +106,23 @@ class FastestReport(ReportPart):
     """How near a motion that was searched for is to the fastest through its points."""
 
     lower: Annotated[
-        float | None,
-        Field(description="No motion through the points is faster, seconds; null where none is known."),
+        float | None, described("No motion through the points is faster, seconds; null where none is known.")
     ]
-    above: Annotated[
-        float | None, Field(description="Part by which the move is at most above the fastest possible.")
-    ]
-    joint: Annotated[
-        str | None, Field(description="The joint that needs so long; null where several together do.")
-    ]
+    above: Annotated[float | None, described("Part by which the move is at most above the fastest possible.")]
+    joint: Annotated[str | None, described("The joint that needs so long; null where several together do.")]
     method: Annotated[
         Literal["bounded", "heuristic"],
-        Field(description="bounded: `above` is proven; heuristic: nothing is known of it."),
+        described("bounded: `above` is proven; heuristic: nothing is known of it."),
     ]
-    starts: Annotated[int, Field(description="How many starting points were tried.")]
+    starts: Annotated[int, described("How many starting points were tried.")]
     agreeing: Annotated[
-        int, Field(description="How many of them led to this duration, or a thousandth above it at most.")
+        int, described("How many of them led to this duration, or a thousandth above it at most.")
     ]
     found: Annotated[
-        list[float | None],
-        Field(description="Durations to which they led, seconds; null where one led to none."),
+        list[float | None], described("Durations to which they led, seconds; null where one led to none.")
     ]
     stopping: Annotated[
-        float | None, Field(description="Seconds with a stop at each point; null where there is none.")
+        float | None, described("Seconds with a stop at each point; null where there is none.")
     ]
     off_chords: list[OffChordReport]
 
@@ -137,24 +131,20 @@ class ToolPeakReport(ReportPart):
     """The largest magnitude of one quantity of the tool in one move."""
 
     quantity: ToolLimit
-    value: Annotated[float, MeasuredIn(), Field(description="SI, of the tool as forward kinematics has it.")]
-    bound: Annotated[
-        float, MeasuredIn(), Field(description="It is proven to be at most this at every time, SI.")
-    ]
-    time: Annotated[float, Field(description="Where it is, seconds from the start of the trajectory.")]
-    limit: Annotated[float | None, MeasuredIn(), Field(description="SI; null is unlimited.")]
+    value: Annotated[float, MeasuredIn(), described("SI, of the tool as forward kinematics has it.")]
+    bound: Annotated[float, MeasuredIn(), described("It is proven to be at most this at every time, SI.")]
+    time: Annotated[float, described("Where it is, seconds from the start of the trajectory.")]
+    limit: Annotated[float | None, MeasuredIn(), described("SI; null is unlimited.")]
     unit: UnitName
-    negligible: Annotated[bool, Field(description="Whether it is what rounding leaves of a tool at rest.")]
+    negligible: Annotated[bool, described("Whether it is what rounding leaves of a tool at rest.")]
 
 
 class LowestSpeedReport(ReportPart):
     """Where the tool is slowest between the first and the last point at which its speed is the wanted one."""
 
-    speed: Annotated[
-        float, MeasuredIn(), Field(description="m/s, or rad/s where the tool turns in its place.")
-    ]
-    place: Annotated[float, MeasuredIn("place_unit"), Field(description="s on the path, m or rad.")]
-    joint: Annotated[str | None, Field(description="The joint that is the reason, where one is known.")]
+    speed: Annotated[float, MeasuredIn(), described("m/s, or rad/s where the tool turns in its place.")]
+    place: Annotated[float, MeasuredIn("place_unit"), described("s on the path, m or rad.")]
+    joint: Annotated[str | None, described("The joint that is the reason, where one is known.")]
     unit: UnitName
     place_unit: UnitName
 
@@ -162,73 +152,65 @@ class LowestSpeedReport(ReportPart):
 class SegmentSpeedsReport(ReportPart):
     """Neighbouring segments of a path with the same limits of speed, which other segments do not have."""
 
-    first: Annotated[int, Field(description="Index of the first of these segments, from 0.")]
-    last: Annotated[int, Field(description="Index of the last one.")]
+    first: Annotated[int, described("Index of the first of these segments, from 0.")]
+    last: Annotated[int, described("Index of the last one.")]
     begins: Annotated[
-        float,
-        MeasuredIn("place_unit"),
-        Field(description="s on the path, m; in a rounded corner its middle."),
+        float, MeasuredIn("place_unit"), described("s on the path, m; in a rounded corner its middle.")
     ]
-    ends: Annotated[float, MeasuredIn("place_unit"), Field(description="Likewise.")]
+    ends: Annotated[float, MeasuredIn("place_unit"), described("Likewise.")]
     place_unit: UnitName = "m"
-    start: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    end: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    peaks: Annotated[
-        list[ToolPeakReport], Field(description="Of the speeds that are limited here, for all t.")
-    ]
+    start: TrajectorySeconds
+    end: TrajectorySeconds
+    peaks: Annotated[list[ToolPeakReport], described("Of the speeds that are limited here, for all t.")]
 
 
 class ToolReport(ReportPart):
     """The tool on its path."""
 
     length: Annotated[
-        float, MeasuredIn(), Field(description="Of the path, m, or rad where the tool turns in its place.")
+        float, MeasuredIn(), described("Of the path, m, or rad where the tool turns in its place.")
     ]
     unit: Literal["m", "rad", "mm", "deg"]
     ruled_by: Annotated[
         Literal["translation", "rotation"] | None,
-        Field(description="Whose limits say how fast; null where a duration or the joints do."),
+        described("Whose limits say how fast; null where a duration or the joints do."),
     ]
     wanted_speed: Annotated[
         float | None,
         MeasuredIn("speed_unit"),
-        Field(description="Along the path, m/s or rad/s; null where no speed is named."),
+        described("Along the path, m/s or rad/s; null where no speed is named."),
     ]
     speed_unit: UnitName
-    held: Annotated[
-        float | None, Field(description="Part of the path over which the wanted speed is held, 0 to 1.")
-    ]
+    held: Annotated[float | None, described("Part of the path over which the wanted speed is held, 0 to 1.")]
     lowest: LowestSpeedReport | None
     segments: Annotated[
         list[SegmentSpeedsReport] | None,
-        Field(description="Where limits of speed step from segment to segment; null where they do not."),
+        described("Where limits of speed step from segment to segment; null where they do not."),
     ] = None
     peaks: list[ToolPeakReport]
     deviation: Annotated[
-        float, MeasuredIn("deviation_unit"), Field(description="Largest distance from its path on rows, m.")
+        float, MeasuredIn("deviation_unit"), described("Largest distance from its path on rows, m.")
     ]
     deviation_bound: Annotated[
         float | None,
         MeasuredIn("deviation_unit"),
-        Field(description="What the distance does not exceed at any time; null where only rows say it."),
+        described("What the distance does not exceed at any time; null where only rows say it."),
     ] = None
     deviation_unit: UnitName = "m"
     turned: Annotated[
-        float,
-        MeasuredIn("turned_unit"),
-        Field(description="Largest angle from its orientation on rows, rad."),
+        float, MeasuredIn("turned_unit"), described("Largest angle from its orientation on rows, rad.")
     ]
     turned_bound: Annotated[
         float | None,
         MeasuredIn("turned_unit"),
-        Field(description="What the angle does not exceed at any time; null where only rows say it."),
+        described("What the angle does not exceed at any time; null where only rows say it."),
     ] = None
     turned_unit: UnitName = "rad"
     method: Annotated[
         Literal["bounded", "sampled"],
-        Field(
-            description="bounded: deviation and turned are proven for all t; sampled: at least one of them "
-            "on rows alone, as the branch always is."
+        described(
+            "bounded: deviation and turned are proven for all t; sampled: at least one of them on rows "
+            "alone, as the branch always is."
         ),
     ] = "sampled"
 
@@ -236,33 +218,28 @@ class ToolReport(ReportPart):
 class MoveReport(ReportPart):
     """One move."""
 
-    index: Annotated[int, Field(description="From 0.")]
+    index: Annotated[int, described("From 0.")]
     planner: str
-    label: Annotated[str | None, Field(description="What it is for; null where the job says nothing.")] = None
+    label: Annotated[str | None, described("What it is for; null where the job says nothing.")] = None
     round: Annotated[
-        str | None,
-        Field(description="In which round of a repeat, such as slot 3 of 18; null outside of any."),
+        str | None, described("In which round of a repeat, such as slot 3 of 18; null outside of any.")
     ] = None
-    start: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    end: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    start: TrajectorySeconds
+    end: TrajectorySeconds
     duration: ReportSeconds
-    continuity: Annotated[
-        Literal[1, 2], Field(description="Derivatives that the planner joins without a jump.")
-    ]
-    stretch: Annotated[float, Field(description="How many times longer it lasts than its planner said.")]
+    continuity: Annotated[Literal[1, 2], described("Derivatives that the planner joins without a jump.")]
+    stretch: Annotated[float, described("How many times longer it lasts than its planner said.")]
     peaks: list[PeakReport]
     velocity_by_position: Annotated[
-        list[ByPositionReport] | None, Field(description="Null where no joint has such a limit.")
+        list[ByPositionReport] | None, described("Null where no joint has such a limit.")
     ] = None
-    efforts: Annotated[
-        list[EffortReport] | None, Field(description="Null where no limit of effort is in force.")
-    ] = None
-    payload: Annotated[
-        PayloadReport | None, Field(description="What the tool carries; null for nothing.")
-    ] = None
+    efforts: Annotated[list[EffortReport] | None, described("Null where no limit of effort is in force.")] = (
+        None
+    )
+    payload: Annotated[PayloadReport | None, described("What the tool carries; null for nothing.")] = None
     mounted: Annotated[
         MountedToolReport | None,
-        Field(description="The tool on the flange, where the job has `tools` or changes it; else null."),
+        described("The tool on the flange, where the job has `tools` or changes it; else null."),
     ] = None
     binding: BindingReport | None
     at_limit: list[AtLimitReport] = Field(
@@ -271,35 +248,31 @@ class MoveReport(ReportPart):
     )
     savings: Annotated[
         list[SavingReport] | None,
-        Field(description="Asked for by `explain --sensitivity`; empty where the duration is given."),
+        described("Asked for by `explain --sensitivity`; empty where the duration is given."),
     ] = None
     waypoints: Annotated[
-        tuple[WaypointReport, ...] | None,
-        Field(description="The points it passes; null for a move without any."),
+        tuple[WaypointReport, ...] | None, described("The points it passes; null for a move without any.")
     ] = None
     outside: Annotated[
         tuple[OutsideReport, ...] | None,
-        Field(
-            description="Joints that leave the range of the waypoints, and how far; null without waypoints."
-        ),
+        described("Joints that leave the range of the waypoints, and how far; null without waypoints."),
     ] = None
     fastest: Annotated[
-        FastestReport | None,
-        Field(description="Of a motion that was searched for; null for other moves."),
+        FastestReport | None, described("Of a motion that was searched for; null for other moves.")
     ] = None
-    tool: Annotated[
-        ToolReport | None, Field(description="The tool on its path; null for a move in joint space.")
-    ] = None
+    tool: Annotated[ToolReport | None, described("The tool on its path; null for a move in joint space.")] = (
+        None
+    )
     tool_peaks: Annotated[
         list[ToolPeakReport] | None,
-        Field(description="Of the tool in joint space; null where `limits.tcp` asks for none."),
+        described("Of the tool in joint space; null where `limits.tcp` asks for none."),
     ] = None
     reference: ReferenceReport | None = None
     path_reference: Annotated[
         PathReferenceReport | None,
-        Field(
-            description="Asked for by `--reference`; null for a move from state to state. `explain` has that "
-            "of time-optimal moves always."
+        described(
+            "Asked for by `--reference`; null for a move from state to state. `explain` has that of "
+            "time-optimal moves always."
         ),
     ] = None
 
@@ -310,19 +283,17 @@ class FindingReport(ReportPart):
     move: int | None
     joint: str | None
     kind: str
-    value: Annotated[float, MeasuredIn(), Field(description="SI.")]
-    limit: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    value: InSi
+    limit: InSi
     unit: UnitName
-    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
+    time: TrajectorySeconds
     method: Annotated[
         Literal["exact", "bounded", "sampled"],
-        Field(description="exact: a root; bounded: proven between rows; sampled: the largest on rows."),
+        described("exact: a root; bounded: proven between rows; sampled: the largest on rows."),
     ]
-    factor: Annotated[
-        float | None, Field(description="The move must last this many times longer; null: no help.")
-    ]
-    message: Annotated[str, Field(description="What is wrong, in the units of the job.")]
-    hint: Annotated[str | None, Field(description="What would fix it.")] = None
+    factor: Annotated[float | None, described("The move must last this many times longer; null: no help.")]
+    message: Annotated[str, described("What is wrong, in the units of the job.")]
+    hint: Annotated[str | None, described("What would fix it.")] = None
 
 
 class EventReport(ReportPart):
@@ -338,8 +309,8 @@ class StepReport(ReportPart):
 
     move: int
     joint: str
-    time: Annotated[float, Field(description="Seconds from the start of the trajectory.")]
-    size: Annotated[float, MeasuredIn(), Field(description="Acceleration after minus before, SI.")]
+    time: TrajectorySeconds
+    size: Annotated[float, MeasuredIn(), described("Acceleration after minus before, SI.")]
     unit: UnitName
 
 
@@ -359,20 +330,16 @@ class UncheckedToolReport(ReportPart):
 class KnotsDeviation(ReportPart):
     """What quintics between the knots miss, of the joint that deviates most."""
 
-    position: Annotated[
-        float, MeasuredIn("position_unit"), Field(description="Of the position, for all t; SI.")
-    ]
+    position: Annotated[float, MeasuredIn("position_unit"), described("Of the position, for all t; SI.")]
     position_unit: UnitName
-    velocity: Annotated[
-        float, MeasuredIn("velocity_unit"), Field(description="Of the velocity, for all t; SI.")
-    ]
+    velocity: Annotated[float, MeasuredIn("velocity_unit"), described("Of the velocity, for all t; SI.")]
     velocity_unit: UnitName
 
 
 class KnotsReport(ReportPart):
     """The knots that a controller gets, and how well quintics between them reproduce the trajectory."""
 
-    count: Annotated[int, Field(description="How many.")]
+    count: Annotated[int, described("How many.")]
     deviation: KnotsDeviation
 
 
@@ -380,12 +347,12 @@ class WorstOfRows(ReportPart):
     """The limit that the curve through the rows passes by the largest factor."""
 
     kind: str
-    joint: Annotated[str | None, Field(description="null: the tool.")]
+    joint: Annotated[str | None, described("null: the tool.")]
     move: int | None
-    row: Annotated[int, Field(description="The row that it stands at, or behind; from 1.")]
-    time: Annotated[float, Field(description="Of that row, s, as written.")]
-    value: Annotated[float, MeasuredIn(), Field(description="SI.")]
-    limit: Annotated[float, MeasuredIn(), Field(description="SI.")]
+    row: Annotated[int, described("The row that it stands at, or behind; from 1.")]
+    time: Annotated[float, described("Of that row, s, as written.")]
+    value: InSi
+    limit: InSi
     unit: UnitName
 
 
@@ -393,12 +360,10 @@ class RowsReport(ReportPart):
     """What becomes of the limits as the rows are joined by what their columns state."""
 
     interpolation: Literal["linear", "cubic", "quintic"]
-    verdict: Annotated[
-        Literal["satisfied", "exceeded"], Field(description="exceeded: the event joined_over_limit.")
-    ]
+    verdict: Annotated[Literal["satisfied", "exceeded"], described("exceeded: the event joined_over_limit.")]
     worst: WorstOfRows | None = None
     rate_that_keeps: Annotated[
-        float | None, Field(description="Hz; a higher rate whose rows keep every limit; null: none found.")
+        float | None, described("Hz; a higher rate whose rows keep every limit; null: none found.")
     ] = None
 
 
@@ -406,14 +371,14 @@ class Report(ReportPart):
     """What became of a job."""
 
     version: Literal[1] = 1
-    trajcli: Annotated[str, Field(description="Version of trajcli.")]
+    trajcli: Annotated[str, described("Version of trajcli.")]
     verdict: Literal["verified", "violated"]
-    job: Annotated[str, Field(description="The job's name.")]
-    robot: Annotated[str, Field(description="The robot's name.")]
+    job: Annotated[str, described("The job's name.")]
+    robot: Annotated[str, described("The robot's name.")]
     duration: ReportSeconds
     moves: tuple[MoveReport, ...]
     findings: list[FindingReport]
-    events: Annotated[list[EventReport], Field(description="Concessions, which `--strict` refuses.")]
+    events: Annotated[list[EventReport], described("Concessions, which `--strict` refuses.")]
     remarks: list[EventReport] = Field(
         default_factory=list, description="How curves were computed, where that is worth a word."
     )
@@ -421,24 +386,21 @@ class Report(ReportPart):
     unchecked: list[UncheckedReport]
     unchecked_of_tool: list[UncheckedToolReport] = Field(default_factory=list)
     savings: Annotated[
-        list[SavingReport] | None,
-        Field(description="Of all moves together, asked for by `explain --sensitivity`."),
+        list[SavingReport] | None, described("Of all moves together, asked for by `explain --sensitivity`.")
     ] = None
-    consumer: Annotated[ConsumerReport | None, Field(description="Asked for by `--for`; null otherwise.")] = (
+    consumer: Annotated[ConsumerReport | None, described("Asked for by `--for`; null otherwise.")] = None
+    efforts: Annotated[EffortsReport | None, described("Of an arm with geometry; null for bare joints.")] = (
         None
     )
-    efforts: Annotated[
-        EffortsReport | None, Field(description="Of an arm with geometry; null for bare joints.")
-    ] = None
     knots: Annotated[
         KnotsReport | None,
-        Field(description="Of /joint_trajectory; null where a limit is broken, or the motion lasts months."),
+        described("Of /joint_trajectory; null where a limit is broken, or the motion lasts months."),
     ] = None
     rows: Annotated[
         RowsReport | None,
-        Field(description="Of the rows as written; null where a limit is broken, or nothing joins them."),
+        described("Of the rows as written; null where a limit is broken, or nothing joins them."),
     ] = None
     flyby: Annotated[
-        FlyByReport | None, Field(description="Of corners that are flown by; null where no zone is named.")
+        FlyByReport | None, described("Of corners that are flown by; null where no zone is named.")
     ] = None
-    signals: Annotated[list[SignalReport], Field(description="Signals as they are set, by time.")] = []
+    signals: Annotated[list[SignalReport], described("Signals as they are set, by time.")] = []

@@ -11,8 +11,16 @@ from trajcli.frozen import comparable
 from trajcli.units import AngleUnit, LengthUnit, Quantity, Units, factor
 
 Part = TypeVar("Part", bound="ReportPart")
-ReportSeconds = Annotated[float, Field(description="Seconds.")]
-UnitName = Annotated[str, Field(description="Unit of the numbers beside it, such as rad/s.")]
+
+
+def described(text: str) -> Any:  # noqa: ANN401
+    """Return what the schema says about a field."""
+    return Field(description=text)
+
+
+TrajectorySeconds = Annotated[float, described("Seconds from the start of the trajectory.")]
+ReportSeconds = Annotated[float, described("Seconds.")]
+UnitName = Annotated[str, described("Unit of the numbers beside it, such as rad/s.")]
 JointQuantity = Literal["position", "velocity", "acceleration", "jerk"]
 
 
@@ -25,6 +33,9 @@ class MeasuredIn:
     """
 
     field: str = "unit"
+
+
+InSi = Annotated[float, MeasuredIn(), described("SI.")]
 
 
 class ReportPart(BaseModel):
