@@ -53,17 +53,19 @@ def test_a_name_of_another_format_is_refused(ending, tmp_path):
 def test_a_format_is_one_entry(tmp_path, monkeypatch):
     seen = []
 
-    def write(rows, columns, out, options):
+    def write(rows, columns, out):
         seen.append([(column.quantity, column.joint, column.factor) for column in columns])
         for block in rows:
             out.write(repr(block.tolist()).encode())
             yield block
 
-    def verify(written, rows, columns, options):
+    def verify(written, rows, columns):
         for block in rows:
             assert written.read().decode() == repr(block.tolist())
 
-    monkeypatch.setattr(formats, "FORMATS", {**FORMATS, "rows": StreamFormat("rows", write, verify)})
+    monkeypatch.setattr(
+        formats, "FORMATS", {**FORMATS, "rows": StreamFormat("rows", lambda _: (write, verify))}
+    )
     monkeypatch.setattr(formats, "ENDINGS", {".csv": ("csv",), ".rows": ("rows",)})
     write_verified(tmp_path / "out.rows", [ROWS], COLUMNS)
     assert (tmp_path / "out.rows").read_text() == repr(ROWS.tolist())

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from trajcli.streams.ros_yaml import RosMessage
 
 T = TypeVar("T")
+WriteBlocks = Callable[[Iterable[Array], Sequence[Column], BinaryIO], Iterator[Array]]
+VerifyBlocks = Callable[[BinaryIO, Iterable[Array], Sequence[Column]], None]
 
 FormatName = Literal["csv", "mcap", "jsonl", "npy", "npz", "ros", "ros-goal"]
 
@@ -66,9 +68,10 @@ class StreamFormat:
 
     Attributes:
         name: For messages.
-        write_blocks: Writes blocks of rows, one by one, to a stream, and yields each when it is written; the
-            stream is complete when the iterator has ended.
-        verify: Reads a stream from its beginning, and raises TrajcliError where it does not hold these rows.
+        functions: Returns the two functions of the format: one writes blocks of rows of some columns, one by
+            one, to a stream, and yields each when it is written (the stream is complete when the iterator has
+            ended); one reads a stream from its beginning, and raises TrajcliError where it does not hold
+            these rows.
         content: Rows of the columns that the job asks for; a log with messages, topics and times of a clock;
             or the knots of the motion, and no rows.
         si: Whether its rows are SI, whatever the units of the job.
@@ -79,8 +82,7 @@ class StreamFormat:
     """
 
     name: str
-    write_blocks: Callable[[Iterable[Array], Sequence[Column], BinaryIO, WriteOptions], Iterator[Array]]
-    verify: Callable[[BinaryIO, Iterable[Array], Sequence[Column], WriteOptions], None]
+    functions: Callable[[WriteOptions], tuple[WriteBlocks, VerifyBlocks]]
     content: Literal["rows", "log", "knots"] = "rows"
     si: bool = True
     text: bool = True
@@ -91,115 +93,60 @@ class StreamFormat:
         self, rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions
     ) -> None:
         """Write blocks of rows, one by one, to a stream."""
-        for _ in self.write_blocks(rows, columns, out, options):
+        for _ in self.functions(options)[0](rows, columns, out):
             pass
 
 
-def _write_csv(
-    rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions
-) -> Iterator[Array]:
-    return write_csv_blocks(rows, columns, out, options.digits)
+def _csv(options: WriteOptions) -> tuple[WriteBlocks, VerifyBlocks]:
+    return partial(write_csv_blocks, digits=options.digits), partial(verify_csv, digits=options.digits)
 
 
-def _verify_csv(
-    written: BinaryIO, rows: Iterable[Array], columns: Sequence[Column], options: WriteOptions
-) -> None:
-    verify_csv(written, rows, columns, options.digits)
-
-
-def _write_jsonl(
-    rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions
-) -> Iterator[Array]:
+def _jsonl(options: WriteOptions) -> tuple[WriteBlocks, VerifyBlocks]:
     del options
-    from trajcli.streams.jsonl import write_jsonl_blocks
+    from trajcli.streams.jsonl import verify_jsonl, write_jsonl_blocks
 
-    return write_jsonl_blocks(rows, columns, out)
+    return write_jsonl_blocks, verify_jsonl
 
 
-def _verify_jsonl(
-    written: BinaryIO, rows: Iterable[Array], columns: Sequence[Column], options: WriteOptions
-) -> None:
+def _npy(options: WriteOptions) -> tuple[WriteBlocks, VerifyBlocks]:
     del options
-    from trajcli.streams.jsonl import verify_jsonl
+    from trajcli.streams.arrays import verify_npy, write_npy_blocks
 
-    verify_jsonl(written, rows, columns)
+    return write_npy_blocks, verify_npy
 
 
-def _write_arrays(
-    rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions, *, archive: bool
-) -> Iterator[Array]:
+def _npz(options: WriteOptions) -> tuple[WriteBlocks, VerifyBlocks]:
     del options
-    from trajcli.streams.arrays import write_npy_blocks, write_npz_blocks
+    from trajcli.streams.arrays import verify_npz, write_npz_blocks
 
-    return (write_npz_blocks if archive else write_npy_blocks)(rows, columns, out)
-
-
-def _verify_arrays(
-    written: BinaryIO,
-    rows: Iterable[Array],
-    columns: Sequence[Column],
-    options: WriteOptions,
-    *,
-    archive: bool,
-) -> None:
-    del options
-    from trajcli.streams.arrays import verify_npy, verify_npz
-
-    (verify_npz if archive else verify_npy)(written, rows, columns)
+    return write_npz_blocks, verify_npz
 
 
-def _arrays(name: str, *, archive: bool) -> StreamFormat:
-    write, verify = partial(_write_arrays, archive=archive), partial(_verify_arrays, archive=archive)
-    return StreamFormat(name, write, verify, text=False)
-
-
-def _write_mcap(
-    rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions
-) -> Iterator[Array]:
+def _mcap(options: WriteOptions) -> tuple[WriteBlocks, VerifyBlocks]:
+    from trajcli.streams.mcap.verify import verify_mcap
     from trajcli.streams.mcap.write import write_mcap_blocks
 
-    return write_mcap_blocks(rows, columns, out, _made(options.recording))
+    recording = _made(options.recording)
+    return partial(write_mcap_blocks, recording=recording), partial(verify_mcap, recording=recording)
 
 
-def _verify_mcap(
-    written: BinaryIO, rows: Iterable[Array], columns: Sequence[Column], options: WriteOptions
-) -> None:
-    from trajcli.streams.mcap.verify import verify_mcap
-
-    verify_mcap(written, rows, columns, _made(options.recording))
-
-
-def _write_ros(
-    rows: Iterable[Array],
-    columns: Sequence[Column],
-    out: BinaryIO,
-    options: WriteOptions,
-    *,
-    message: RosMessage,
-) -> Iterator[Array]:
-    del columns
-    from trajcli.streams.ros_yaml import write_ros_yaml
+def _ros(options: WriteOptions, message: RosMessage) -> tuple[WriteBlocks, VerifyBlocks]:
+    from trajcli.streams.ros_yaml import verify_ros_yaml, write_ros_yaml
 
     goal = _made(options.goal)
-    write_ros_yaml(goal.joint_names, goal.knots, out, message, goal.orders)
-    yield from rows
 
+    def write(rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO) -> Iterator[Array]:
+        del columns
+        write_ros_yaml(goal.joint_names, goal.knots, out, message, goal.orders)
+        yield from rows
 
-def _verify_ros(
-    written: BinaryIO,
-    rows: Iterable[Array],
-    columns: Sequence[Column],
-    options: WriteOptions,
-    *,
-    message: RosMessage,
-) -> None:
-    del columns
-    from trajcli.streams.ros_yaml import verify_ros_yaml
+    def verify(written: BinaryIO, rows: Iterable[Array], columns: Sequence[Column]) -> None:
+        del columns
+        for _ in rows:  # the file is written when they have ended
+            pass
+        verify_ros_yaml(written, goal.joint_names, goal.knots, message, goal.orders)
 
-    goal = _made(options.goal)
-    for _ in rows:  # the file is written when they have ended
-        pass
-    verify_ros_yaml(written, goal.joint_names, goal.knots, message, goal.orders)
+    return write, verify
 
 
 def _made(make: Callable[[], T] | None) -> T:
@@ -208,19 +155,14 @@ def _made(make: Callable[[], T] | None) -> T:
     return make()
 
 
-def _ros(name: str, message: RosMessage) -> StreamFormat:
-    write, verify = partial(_write_ros, message=message), partial(_verify_ros, message=message)
-    return StreamFormat(name, write, verify, "knots")
-
-
 FORMATS: Mapping[FormatName, StreamFormat] = {
-    "csv": StreamFormat("CSV", _write_csv, _verify_csv, si=False, decimals=True, in_order=True),
-    "mcap": StreamFormat("MCAP", _write_mcap, _verify_mcap, "log", text=False),
-    "jsonl": StreamFormat("JSON lines", _write_jsonl, _verify_jsonl, in_order=True),
-    "npy": _arrays("NPY", archive=False),
-    "npz": _arrays("NPZ", archive=True),
-    "ros": _ros("a ROS message", "ros"),
-    "ros-goal": _ros("a ROS goal", "ros-goal"),
+    "csv": StreamFormat("CSV", _csv, si=False, decimals=True, in_order=True),
+    "mcap": StreamFormat("MCAP", _mcap, "log", text=False),
+    "jsonl": StreamFormat("JSON lines", _jsonl, in_order=True),
+    "npy": StreamFormat("NPY", _npy, text=False),
+    "npz": StreamFormat("NPZ", _npz, text=False),
+    "ros": StreamFormat("a ROS message", partial(_ros, message="ros"), "knots"),
+    "ros-goal": StreamFormat("a ROS goal", partial(_ros, message="ros-goal"), "knots"),
 }
 ENDINGS: Mapping[str, tuple[FormatName, ...]] = {
     ".csv": ("csv",),
@@ -297,19 +239,19 @@ def write_verified(
         if not out.readable():
             stream_format.write(rows, columns, out, how)
             return
+        write, verify = stream_format.functions(how)
         if stream_format.in_order:
             # whoever writes no file does not pay for the import
             from trajcli.streams.checked_file import write_and_compare
 
             write_and_compare(
                 out,
-                lambda text: stream_format.write_blocks(rows, columns, text, how),
-                lambda text, blocks: stream_format.verify(text, blocks, columns, how),
+                lambda text: write(rows, columns, text),
+                lambda text, blocks: verify(text, blocks, columns),
             )
             return
         with Path(out.name).open("rb") as back:
-            flushed = _flushed(stream_format.write_blocks(rows, columns, out, how), out)
-            stream_format.verify(back, flushed, columns, how)
+            verify(back, _flushed(write(rows, columns, out), out), columns)
 
 
 def _flushed(blocks: Iterable[Array], out: BinaryIO) -> Iterator[Array]:
