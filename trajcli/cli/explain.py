@@ -160,10 +160,7 @@ def _lines(explained: Explanation, plan: Plan, *, peers: bool = False) -> Iterat
         yield from _efforts(move)
         yield from _speed(move)
         yield from _zones(explained, move.index)
-        if peers:
-            from trajcli.cli.plan import peer_lines
-
-            yield from peer_lines(move)
+        yield from _peers(move) if peers else ()
         yield from (f"  {event.kind}: {event.message}" for event in noted if event.move == move.index)
     if explained.savings is not None and len(explained.moves) > 1:
         yield ""
@@ -196,6 +193,12 @@ def _zones(explained: Explanation, move: int) -> Iterator[str]:
             text += f"; the tool {zone.nearest:.4g} to {zone.farthest:.4g} {zone.length_unit} from the corner"
             text += f", {zone.deviation:.4g} {zone.length_unit} off its path"
         yield f"{text}; binding: {zone.binds}"
+
+
+def _peers(move: ExplainedMove) -> Iterator[str]:
+    from trajcli.cli.plan import peer_lines
+
+    return peer_lines(move)
 
 
 def _phases(move: ExplainedMove) -> Iterator[str]:

@@ -59,9 +59,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
         _older_rows_aside(options),
         progress(to_terminal=options.output in (None, "-") and not options.no_output and not table),
     ):
-        with np.errstate(
-            all="ignore"
-        ):  # what is not finite is for the checks to find, not for numpy to print
+        with np.errstate(all="ignore"):  # what is not finite is for the checks to find
             made = None if wanted is None else _made(wanted, form, options)
             plan = plan_job(loaded) if made is None else made.plan
         grid = grid_of(plan)
