@@ -51,7 +51,7 @@ def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace
     """Even at a lower pace in its zone than elsewhere its motion is one: then it takes that much longer."""
     chain, stopping = chain_with(moves)
     chain = with_shares(chain, pace ** POWERS[None])
-    laws = StoppingLaws()
+    laws = StoppingLaws({})
     assert laws.slow_all(chain)
     assert not laws.slow_all(chain)
     row = row_of(chain, [1.0, 1.0], [1.0, 1.0], laws.states(chain))
@@ -70,7 +70,7 @@ def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace
 
 def test_a_state_comes_from_that_of_a_faster_law_to_that_of_the_one_that_stops():
     chain, _ = chain_with("joints")
-    laws, found = StoppingLaws(), np.array([[0.0, 0.0], [1.2, -3.0], [1.1, 2.0], [0.0, 0.0]])
+    laws, found = StoppingLaws({}), np.array([[0.0, 0.0], [1.2, -3.0], [1.1, 2.0], [0.0, 0.0]])
     speeds = []
     for _ in range(3):
         laws.slow(chain, 0, None, found)
@@ -94,7 +94,7 @@ def test_the_border_nearer_to_where_a_law_fails_is_slowed(s, slowed):
     longer = replace(
         chain, courses=(*chain.courses, chain.courses[0]), corners=(corner, corner), tempos=(1.0,) * 3
     )
-    laws = StoppingLaws()
+    laws = StoppingLaws({})
     laws.slow(longer, 1, s, np.full((6, 2), 0.1))
     assert sum(laws.states(longer)) == slowed
 

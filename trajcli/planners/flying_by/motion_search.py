@@ -73,10 +73,11 @@ class MotionSearch:
         lowered: Whether a derivative of the joints was lowered in a zone for a limit of the tool.
     """
 
-    def __init__(self, *, by_order: bool) -> None:
+    def __init__(self, laws: dict[int, FlownPart], *, by_order: bool) -> None:
         """Begin.
 
         Args:
+            laws: Of courses from stop to stop, as far as they are known.
             by_order: Whether limits of the tool lower in zones the derivative of the joints that they are
                 about, else the pace.
         """
@@ -86,7 +87,7 @@ class MotionSearch:
         self._paces: dict[int, float] = {}
         self._lowering = 0.0
         self._near: Array | None = None
-        self._laws = StoppingLaws()
+        self._laws = StoppingLaws(laws)
         self._motion: _Motion
 
     def fastest(self, chain: FlyByChain) -> list[FlownPart]:

@@ -49,8 +49,9 @@ class StoppingLaws:
     The border of a course before zone k is number 2 k, that of the course behind it 2 k + 1.
     """
 
-    def __init__(self) -> None:
-        self._laws: dict[int, FlownPart] = {}
+    def __init__(self, laws: dict[int, FlownPart]) -> None:
+        """Begin without such borders, with the laws that are found of courses, by their identity."""
+        self._laws = laws
         self._mixtures: dict[int, _Mixture] = {}
 
     def law(self, chain: FlyByChain, index: int) -> FlownPart:

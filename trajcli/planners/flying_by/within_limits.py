@@ -177,8 +177,9 @@ def _within_limits(
         PlanningError: When none is found.
     """
     found, errors = [], []
+    laws: dict[int, FlownPart] = {}
     for by_order in (True, False):
-        search = MotionSearch(by_order=by_order)
+        search = MotionSearch(laws, by_order=by_order)
         try:
             found.append((*_kept(courses, zones, ends, search), search.model))
         except PlanningError as error:
