@@ -168,8 +168,9 @@ def bound_between_stops(
         ends, turns = (at_stops[k], at_stops[k + 1]), (turning[k], turning[k + 1])
         found = [turning_bound(part, bounds, ends, turns)[0]]
         if part.pieces == 1 and not part.coefficients[:-2].any():
-            along = _along_line(part.coefficients[-2, 0], bounds)
-            found.append(turning_bound(_length_of(part), along, ends, turns)[0])
+            slopes = part.coefficients[-2, 0]
+            velocity, acceleration, jerk = (bounds_along(slopes, bound)[None] for bound in bounds)
+            found.append(turning_bound(_length_of(part), (velocity, acceleration, jerk), ends, turns)[0])
         total.append(max(found))
     return math.fsum(total), None
 
@@ -188,14 +189,12 @@ def _length_of(line: PiecewisePolynomial) -> PiecewisePolynomial:
     return PiecewisePolynomial(line.breaks, np.array([[[1.0]], [[line.start]]]))
 
 
-def _along_line(slopes: Array, bounds: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    """Return the bounds of sd, sdd and sddd, (1, 2) each, along a line with some q' (n,)."""
-    found = []
-    for bound in bounds:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = np.sort(bound / slopes[:, None], axis=1)[slopes != 0.0]
-        found.append(np.array([[ratios[:, 0].max(), ratios[:, 1].min()]]))
-    return found[0], found[1], found[2]
+def bounds_along(slopes: Array, bounds: Array) -> Array:
+    """Return the bounds (2,) of a derivative of s along a line with q' (n,), by those of joints (n, 2)."""
+    moving = slopes != 0.0
+    with np.errstate(over="ignore"):
+        ratios = np.sort(bounds[moving] / slopes[moving, None], axis=1)
+    return np.array([ratios[:, 0].max(), ratios[:, 1].min()])
 
 
 def durations_by_joint(joints: Sequence[MonotoneStretches]) -> Array:

@@ -23,10 +23,7 @@ def shortest_duration(problem: WaypointProblem) -> tuple[float, int | None]:
     direct = np.where(np.isfinite(direct), direct * (1 - _SOLVED), 0.0)
     between_turns = durations_by_joint([_stretches(problem, joint) for joint in range(problem.joints)])
     by_joint = np.maximum(between_turns, direct).tolist()
-    bound = problem.velocity
-    steps = problem.steps
-    at_speed = np.where(steps > 0, steps / bound[:, 1], steps / bound[:, 0]).max(axis=1)
-    together = float(np.maximum(at_speed, problem.least).sum())
+    together = float(problem.times_at_speed.sum())
     worst = int(np.argmax(by_joint))
     if by_joint[worst] >= together:
         return by_joint[worst], worst

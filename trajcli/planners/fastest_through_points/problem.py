@@ -55,6 +55,13 @@ class WaypointProblem:
         return np.diff(self.points, axis=0)
 
     @property
+    def times_at_speed(self) -> Array:
+        """What each segment needs at the velocity limits, and at least is to last, s, shape (K,)."""
+        steps = self.steps
+        times = np.where(steps > 0, steps / self.velocity[:, 1], steps / self.velocity[:, 0]).max(axis=1)
+        return np.asarray(np.maximum(times, self.least))
+
+    @property
     def scales(self) -> Array:
         """Half the ranges of velocity and acceleration, shape (n, 2)."""
         return 0.5 * np.stack([np.ptp(self.velocity, axis=1), np.ptp(self.acceleration, axis=1)], axis=1)

@@ -140,9 +140,7 @@ def _usual_times(problem: WaypointProblem, motion: StateMotion) -> Array:
 
 def _speed_times(problem: WaypointProblem) -> Array:
     """Return what each segment needs at the velocity limits, s, shape (K,)."""
-    steps, bounds = problem.steps, problem.velocity
-    times = np.where(steps > 0, steps / bounds[:, 1], steps / bounds[:, 0]).max(axis=1)
-    times = np.maximum(times, problem.least)
+    times = problem.times_at_speed
     return np.asarray(np.maximum(times, _SHORT * float(times.max())))
 
 

@@ -8,6 +8,7 @@ Source: Berscheid and Kroeger (2021).
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -158,20 +159,33 @@ def common_duration(steps: Array, pairs: Array, limits: Array) -> float:
         pairs: Velocity and acceleration before, then after, shape (n, 4).
         limits: As for `fastest_durations`, shape (n, 6).
     """
+    answer = _answer(_asked(steps, pairs, limits))
+    return np.inf if answer is None else float(answer.duration)
+
+
+def _asked(steps: Array, pairs: Array, limits: Array) -> Any:  # noqa: ANN401 (ruckig has no types)
+    """Return ruckig's input for joints from position zero."""
     import ruckig
 
-    n = steps.size
-    wanted, answer = ruckig.InputParameter(n), ruckig.Trajectory(n)
+    wanted = ruckig.InputParameter(steps.size)
     set_limits(wanted, limits[:, :2], limits[:, 2:4], limits[:, 5])
-    wanted.current_position, wanted.target_position = [0.0] * n, steps.tolist()
+    wanted.current_position, wanted.target_position = [0.0] * steps.size, steps.tolist()
     columns = pairs.T.tolist()
     wanted.current_velocity, wanted.current_acceleration = columns[0], columns[1]
     wanted.target_velocity, wanted.target_acceleration = columns[2], columns[3]
-    try:
-        result = ruckig.Ruckig(n).calculate(wanted, answer)
-    except (ruckig.RuckigError, ValueError):
-        return np.inf
-    return float(answer.duration) if result == ruckig.Result.Working else np.inf
+    return wanted
+
+
+def _answer(wanted: Any) -> Any:  # noqa: ANN401
+    """Return ruckig's trajectory for an input; None where it has none."""
+    import ruckig
+
+    count = wanted.degrees_of_freedom
+    answer = ruckig.Trajectory(count)
+    with suppress(ruckig.RuckigError, ValueError):
+        if ruckig.Ruckig(count).calculate(wanted, answer) == ruckig.Result.Working:
+            return answer
+    return None
 
 
 def _fill(found: Array, steps: Array, pairs: Array, limits: Array, part: slice) -> None:
@@ -179,18 +193,10 @@ def _fill(found: Array, steps: Array, pairs: Array, limits: Array, part: slice) 
     import ruckig
 
     count = part.stop - part.start
-    wanted, answer = ruckig.InputParameter(count), ruckig.Trajectory(count)
-    set_limits(wanted, limits[part, :2], limits[part, 2:4], limits[part, 5])
+    wanted = _asked(steps[part], pairs[part], limits[part])
     wanted.synchronization = ruckig.Synchronization.No
-    wanted.current_position, wanted.target_position = [0.0] * count, steps[part].tolist()
-    columns = pairs[part].T.tolist()
-    wanted.current_velocity, wanted.current_acceleration = columns[0], columns[1]
-    wanted.target_velocity, wanted.target_acceleration = columns[2], columns[3]
-    try:
-        fine = ruckig.Ruckig(count).calculate(wanted, answer) == ruckig.Result.Working
-    except (ruckig.RuckigError, ValueError):
-        fine = False
-    if fine:
+    answer = _answer(wanted)
+    if answer is not None:
         found[part] = answer.independent_min_durations
     elif count == 1:
         found[part] = np.inf

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.operations import along_line, times_at
 from trajcli.curves.piecewise import Array
+from trajcli.curves.turning_bound import bounds_along
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.planners.fastest_through_points.bound import shortest_duration
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
@@ -95,10 +96,7 @@ def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> t
     line = points[-1] - points[0]
     along, _ = _on_line(points)
     moving = line != 0
-    bounds = []
-    for limit in (problem.velocity, problem.acceleration):
-        ends = np.sort(limit[moving] / line[moving, None], axis=1)
-        bounds.append(np.array([[ends[:, 0].max(), ends[:, 1].min()]]))
+    bounds = [bounds_along(line, limit)[None] for limit in (problem.velocity, problem.acceleration)]
     jerk = np.array([(problem.jerk[moving] / np.abs(line[moving])).min()])
     states, fixed = np.zeros((len(points), 1, 2)), np.zeros((len(points), 1, 2), dtype=bool)
     fixed[[0, -1]] = True

@@ -28,9 +28,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.curves.turning_bound import bounds_along
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.planners.flying_by.between_stops import FlyByChain
+from trajcli.planners.flying_by.second_order import SAFE, rounded_down
 
 _GRIDS = (
     (0.3, 4, 3),
@@ -40,8 +42,6 @@ _GRIDS = (
 _PROGRAMMES = 240  # at most
 _ENOUGH = 0.005  # of the duration that is known: nearer to it a bound is good enough
 _THIN = 0.02  # of the whole: a share below which it counts as large
-_DIGIT = 1e-6  # s, to which a bound is rounded down: last bits of processors do not show
-_SAFE = 1e-9  # relative: taken off, for the rounding of sums
 _SWITCHES = (0.25, 0.5, 0.75)  # of an interval, before which extremes have another sign than behind
 _MOST = 10.0  # times its distance, that a motion covers in the programme
 
@@ -108,7 +108,7 @@ def least_duration(chain: FlyByChain, duration: float) -> float:
             programme = next(p for p, row in zip(programmes, _GRIDS, strict=True) if half.width >= row[0])
             found = programme.least_duration(half, max(least, 0.5 * duration), duration)
             heapq.heappush(queue, (max(least, found), count, half))
-    return math.floor(queue[0][0] * (1 - _SAFE) / _DIGIT) * _DIGIT
+    return rounded_down(queue[0][0])
 
 
 @frozen
@@ -291,12 +291,7 @@ def _variables(chain: FlyByChain, on_line: int, in_zone: int) -> Iterator[_Varia
 
 def _along(line: Any, limits: Limits) -> Array:  # noqa: ANN401
     """Return the bounds (3, 2) of a law forward along a line, by the limits of the joints that move."""
-    direction = line.coefficients[0, 0]
-    moving = direction != 0
-    bounds = np.zeros((3, 2))
-    for order in (1, 2, 3):
-        scaled = np.sort(limits.of_order(order)[moving] / direction[moving, None], axis=1)
-        bounds[order - 1] = scaled[:, 0].max(), scaled[:, 1].min()
+    bounds = np.stack([bounds_along(line.coefficients[0, 0], limits.of_order(order)) for order in (1, 2, 3)])
     bounds[0, 0] = 0.0
     return bounds
 
@@ -374,7 +369,7 @@ def _largest_refuted(weights: Array, longest: float) -> float:
     """Return a duration, up to `longest`, at which all of several cubic polynomials of it are below 1."""
 
     def refuted(duration: float) -> bool:
-        return bool((duration ** np.arange(4.0) @ weights < 1.0 - _SAFE).all())
+        return bool((duration ** np.arange(4.0) @ weights < 1.0 - SAFE).all())
 
     if refuted(longest):
         return longest

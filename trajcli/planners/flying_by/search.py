@@ -254,7 +254,7 @@ def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], known: float) -> lis
     ]
     first = not math.isfinite(known)
     for turn in range(max(map(len, orders))):
-        reached, left = _sums(costs)
+        reached, left = least_sums(costs)
         for k, (zone, order) in enumerate(zip(zones, orders, strict=True)):
             if zone is not None and turn < len(order):
                 least = reached[k][:, None] + costs[k] + left[k + 1]
@@ -284,7 +284,7 @@ def _lasts(pairs: Sequence[tuple[Array, Array, ChainPart]], chosen: Sequence[int
     return total
 
 
-def _sums(costs: Sequence[Array]) -> tuple[list[Array], list[Array]]:
+def least_sums(costs: Sequence[Array]) -> tuple[list[Array], list[Array]]:
     """Return the least sums along a row of matrices up to each node, and from there on."""
     reached, left = [np.zeros(1)], [np.zeros(1)]
     for cost in costs:

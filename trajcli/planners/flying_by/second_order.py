@@ -14,7 +14,6 @@ Source: Bobrow, Dubowsky and Gibson (1985), for speeds over s; Bellman (1957).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from trajcli.curves.piecewise import Array, control_points, derivative_coefficie
 from trajcli.frozen import frozen
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
+from trajcli.planners.flying_by.search import least_sums
 
 _CELLS = 48  # of a course, at least
 _INTERVALS = 24  # of the speed at a border, at the most
@@ -31,7 +31,7 @@ _ROUNDS = 6  # of halving
 _HALVINGS = 30  # of a duration through a zone
 _LARGE = 1e100  # stands for no bound
 _DIGIT = 1e-6  # s, to which a bound is rounded down: last bits of processors do not show
-_SAFE = 1e-9  # relative: taken off, for the rounding of sums
+SAFE = 1e-9  # relative: taken off, for the rounding of sums
 
 SpeedIntervals = Array
 """Least and largest speeds at a border, (n, 2)."""
@@ -59,13 +59,13 @@ def second_order_duration(chain: FlyByChain, duration: float) -> float:
     least = 0.0
     for _ in range(_ROUNDS):
         lasting = [part.durations(borders[k], borders[k + 1], duration) for k, part in enumerate(parts)]
-        through = _through(lasting)
+        through = [one + other for one, other in zip(*least_sums(lasting), strict=True)]
         least = max(least, float(through[0].min()))
         if least >= duration:
             break
         kept = [rows[values < duration] for rows, values in zip(borders, through, strict=True)]
         borders = [kept[0], *(_halved(rows, _INTERVALS) for rows in kept[1:-1]), kept[-1]]
-    return math.floor(least * (1 - _SAFE) / _DIGIT) * _DIGIT
+    return rounded_down(least)
 
 
 def _halved(rows: SpeedIntervals, count: int) -> SpeedIntervals:
@@ -77,14 +77,9 @@ def _halved(rows: SpeedIntervals, count: int) -> SpeedIntervals:
     return np.stack([ends[:, :-1], ends[:, 1:]], axis=2).reshape(-1, 2)
 
 
-def _through(lasting: Sequence[Array]) -> list[Array]:
-    """Return what the fastest chain through each interval of each border lasts, by the durations of parts."""
-    before, behind = [np.zeros(1)], [np.zeros(1)]
-    for rows in lasting:
-        before.append((before[-1][:, None] + rows).min(axis=0))
-    for rows in lasting[::-1]:
-        behind.append((rows + behind[-1]).min(axis=1))
-    return [one + other for one, other in zip(before, behind[::-1], strict=True)]
+def rounded_down(bound: float) -> float:
+    """Return a proven bound, s, without what rounding may have added to it."""
+    return math.floor(bound * (1 - SAFE) / _DIGIT) * _DIGIT
 
 
 @frozen
@@ -129,8 +124,8 @@ class CoursePart:
             _cell_times(squares[:, :, 1:], self.caps, self.falls, self.lengths),
         )
         found = np.maximum(times, self.least).sum(axis=2)
-        never = (first[:, 0] ** 2)[:, None] > back[:, 0] * (1 + _SAFE)
-        never |= last[:, 0] ** 2 > (ahead[:, -1] * (1 + _SAFE))[:, None]
+        never = (first[:, 0] ** 2)[:, None] > back[:, 0] * (1 + SAFE)
+        never |= last[:, 0] ** 2 > (ahead[:, -1] * (1 + SAFE))[:, None]
         return np.where(never, longest, found)
 
 

@@ -1,9 +1,5 @@
 """Chains that are as fast as is found, and keep all limits.
 
-Along a straight line in joint space one variable has the same bounds everywhere, and the search is exact.
-Along other paths typical bounds stand for them; how much faster or slower the exact law is between the states
-that were found sets the pace of a second search.
-
 Where a part of the motion is over a limit, its pace alone is lowered until it is not: with time scaled by f,
 velocities go with f, accelerations with f^2, jerks with f^3. Where the tool is over a limit in a zone, that
 derivative of the joints alone is lowered, or the pace, whichever is faster. Where it leaves its zone, smaller
@@ -12,7 +8,6 @@ borders are tried, then a slower pace.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -60,7 +55,7 @@ class FlownChain:
     @property
     def duration(self) -> float:
         """Seconds."""
-        return math.fsum(part.curve.duration for part in self.parts)
+        return duration_of(self.parts)
 
     @property
     def allowed(self) -> FlyByChain:

@@ -17,7 +17,7 @@ from trajcli.curves.operations import along_line, coast_until, hold_until, merge
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem, inward
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
+from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.targets import MinimumDuration
 from trajcli.planners.boundary_states import instant, missing_limit
 from trajcli.planners.planner import Event, Phase, Planned
@@ -263,7 +263,9 @@ def _on_one_line(request: Request, boundaries: Sequence[BoundaryProblem], robot:
     on_line = [rate_along(direction, values, 1 + k // 2, robot) for k, values in enumerate(rates)]
     length = 1.0 if displacement.any() else 0.0
     initial, final = (0.0, on_line[0], on_line[2]), (length, on_line[1], on_line[3])
-    bounds = _bounds_along(direction, robot.limits)
+    from trajcli.curves.turning_bound import bounds_along
+
+    bounds = np.stack([bounds_along(direction, robot.limits.of_order(order)) for order in (1, 2, 3)])
     boundary = BoundaryProblem("the common law", initial, final, bounds, request.control, request.brake)
     _require_common_law(boundary, boundaries, direction, robot)
     alone = fastest(boundary)
@@ -318,18 +320,6 @@ def rate_along(direction: Array, values: Array, order: int, robot: Robot) -> flo
     if off[joint] > _PARALLEL * np.abs(values).max():
         raise _leaves_line(float(values[joint]), order, joint, robot)
     return rate
-
-
-def _bounds_along(direction: Array, limits: Limits) -> Array:
-    """Return the bounds (3, 2) of a law that moves the joints along a line within their limits."""
-    moving = direction != 0
-    bounds = []
-    for order in (1, 2, 3):
-        with np.errstate(over="ignore"):
-            scaled = limits.of_order(order)[moving] / direction[moving, None]
-        scaled.sort(axis=1)
-        bounds.append([scaled[:, 0].max(), scaled[:, 1].min()])
-    return np.array(bounds)
 
 
 def _duration_events(least: float, duration: float, alone: float) -> list[Event]:
