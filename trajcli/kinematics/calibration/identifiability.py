@@ -16,7 +16,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
-from trajcli.kinematics.calibration.parameters import ArmParameter
+from trajcli.kinematics.calibration.parameters import ArmParameter, units_of
 
 RANK_TOLERANCE = 1e-8
 """Of the largest singular value; below it a combination of parameters counts as unidentifiable."""
@@ -65,7 +65,7 @@ def identifiability(jacobian: Array, parameters: Sequence[ArmParameter], length:
         parameters: The p parameters.
         length: Metres that count like a radian.
     """
-    units = np.array([1.0 if parameter.angular else length for parameter in parameters])
+    units = units_of(parameters, length)
     triangle = np.linalg.qr(jacobian * units, mode="r")
     lengths = np.linalg.norm(triangle, axis=0)
     seen = lengths > _NO_COLUMN * lengths.max(initial=0.0)
@@ -82,7 +82,7 @@ def _combinations(
     kernel: Array, parameters: Sequence[ArmParameter], length: float
 ) -> tuple[tuple[Share, ...], ...]:
     """Return the combinations (k, p) of a kernel with few parameters each, sorted by their first."""
-    units = np.array([1.0 if parameter.angular else length for parameter in parameters])
+    units = units_of(parameters, length)
     reduced = _reduced(kernel / units) * units
     combinations = []
     for row in reduced:

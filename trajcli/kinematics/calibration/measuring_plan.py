@@ -25,7 +25,7 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.calibration.identifiability import Identifiability, identifiability
 from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
-from trajcli.kinematics.calibration.parameters import ArmParameter
+from trajcli.kinematics.calibration.parameters import ArmParameter, units_of
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
 
@@ -133,7 +133,7 @@ def measuring_plan(
     seen = identifiability(rows.reshape(-1, len(parameters)), parameters, length)
     _check_counts(count, candidates, rows.shape[1], seen, part)
     chosen = _chosen((rows.reshape(-1, len(parameters)) @ seen.basis).reshape(*rows.shape[:2], -1), count)
-    units = np.array([1.0 if parameter.angular else length for parameter in parameters])
+    units = units_of(parameters, length)
     scaled = rows[chosen].reshape(-1, len(parameters)) * units
     values = np.linalg.svd(scaled, compute_uv=False)[: seen.rank]
     final = identifiability(rows[chosen].reshape(-1, len(parameters)), parameters, length)

@@ -84,6 +84,11 @@ def parallel_rows(robot: Robot) -> tuple[int, ...]:
     return tuple(row for row, cosine in zip(rows, cosines, strict=True) if abs(cosine) >= np.cos(PARALLEL))
 
 
+def units_of(parameters: Sequence[ArmParameter], length: float) -> Array:
+    """Return what a change of each parameter by one is measured by, (p,): 1 of angles, else `length`."""
+    return np.array([1.0 if parameter.angular else length for parameter in parameters])
+
+
 def _pose_parameters(owner: str) -> tuple[ArmParameter, ...]:
     return tuple(ArmParameter(owner, name) for name in POSE)
 

@@ -228,15 +228,26 @@ def follower(robot: Robot, reference_at: ReferenceAt, start: Array, s: float) ->
     bare = Follower(robot, reference_at, start, np.empty((0, start.size)))
     reference = reference_at(np.array([s]), "right")
     here = linearisation(robot, start[None])
-    # sines of whole numbers are as good as random ones, and need no generator to be loaded
-    spread = np.sin(np.arange(1, _AROUND * start.size + 1)).reshape(_AROUND, start.size)
-    around = start + _SPREAD * spread
-    nearby = bare.rows(reference_at(np.full(_AROUND, s), "right"), *linearisation(robot, around))
-    values = np.linalg.svd(nearby, compute_uv=False)
-    rank = int((values > _RANK * values[:, :1]).sum(axis=1).max())
+    rank = regular_rank(bare, s)
     _, _, right = np.linalg.svd(bare.rows(reference, *here)[0])
     held = Follower(robot, reference_at, start, right[rank:])
     return replace(held, aspect=aspect_of(reference, here[0], held.rows(reference, *here)))
+
+
+def regular_rank(bare: Follower, s: float) -> int:
+    """Return how many directions of the joint values the reference at s fixes, where the arm is regular.
+
+    Args:
+        bare: A follower that holds nothing.
+        s: Where.
+    """
+    start = bare.start
+    # sines of whole numbers are as good as random ones, and need no generator to be loaded
+    spread = np.sin(np.arange(1, _AROUND * start.size + 1)).reshape(_AROUND, start.size)
+    reference = bare.reference_at(np.full(_AROUND, s), "right")
+    rows = bare.rows(reference, *linearisation(bare.robot, start + _SPREAD * spread))
+    values = np.linalg.svd(rows, compute_uv=False)
+    return int((values > _RANK * values[:, :1]).sum(axis=1).max())
 
 
 def aspect_of(reference: ToolReference, poses: Array, rows: Array) -> Aspect:

@@ -9,13 +9,9 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError, Problem
-from trajcli.kinematics.following.follower import Follower
+from trajcli.kinematics.following.follower import Follower, regular_rank
 from trajcli.kinematics.following.tool_path import PinnedJoint, ToolPath
-from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
-
-_RANK = 1e-6  # of the largest singular value: directions with less are free
-_AROUND, _SPREAD = 4, 0.1  # configurations, rad or m: an arm is regular almost everywhere
 
 
 def with_pinned(path: ToolPath, pins: Mapping[int, float], start: Array, robot: Robot) -> ToolPath:
@@ -49,9 +45,4 @@ def with_pinned(path: ToolPath, pins: Mapping[int, float], start: Array, robot: 
 
 def _rank(path: ToolPath, start: Array, robot: Robot) -> int:
     """Return how many directions of the joint values a path fixes, where the arm is regular."""
-    spread = np.sin(np.arange(1, _AROUND * start.size + 1)).reshape(_AROUND, start.size)
-    bare = Follower(robot, path.at_s, start, np.empty((0, start.size)))
-    reference = path.at_s(np.zeros(_AROUND), "right")
-    rows = bare.rows(reference, *linearisation(robot, start + _SPREAD * spread))
-    values = np.linalg.svd(rows, compute_uv=False)
-    return int((values > _RANK * values[:, :1]).sum(axis=1).max())
+    return regular_rank(Follower(robot, path.at_s, start, np.empty((0, start.size))), 0.0)
