@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from euler_curves import euler_between
 from yaml_files import read_yaml
 
 from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.chain import join
-from trajcli.geometry.paths.euler_interpolation import EulerInterpolation
 from trajcli.geometry.paths.orientation import AxisAngleOrientation
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import SAME_POINT, Line, Pivot
@@ -135,7 +135,7 @@ def test_an_arc_through_three_points(case):
 def test_angles_under_a_cubic(case):
     given, rows = case["inputs"], np.array(case["expected"]["samples_t_phi_dphi"])
     sequence, frame = given["convention"].split()
-    curve = EulerInterpolation.between(given["phi_i"], given["phi_f"], sequence, frame)
+    curve = euler_between(given["phi_i"], given["phi_f"], sequence, frame)
     s, sd, _ = cubic(curve.length, given["T"], rows[:, 0])
     angles, slopes, _ = curve.angles_at(s)
     np.testing.assert_allclose(angles, rows[:, 1:4], rtol=0, atol=case["tolerance"])

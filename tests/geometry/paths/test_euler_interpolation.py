@@ -5,6 +5,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from curve_laws import continuous, keeps_the_laws_of_a_rotation
+from euler_curves import euler_between
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -28,7 +29,7 @@ def scipys(sequence, frame, angles):
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_the_angles_change_evenly(sequence, frame):
     start, end = np.array([0.3, -0.4, 1.0]), np.array([-2.0, 1.1, 7.5])
-    curve = EulerInterpolation.between(start, end, sequence.upper(), frame, 0.8)
+    curve = euler_between(start, end, sequence.upper(), frame, 0.8)
     s = np.linspace(0, 0.8, 9)
     way = start + np.outer(s / 0.8, end - start)
     np.testing.assert_allclose(curve.evaluate(s)[0], scipys(sequence, frame, way), rtol=0, atol=1e-14)
@@ -123,10 +124,10 @@ def test_where_nothing_was_typed_the_last_is_read_first():
 
 def test_what_does_not_fit_is_refused():
     with pytest.raises(InputError, match="'xxy' is no sequence"):
-        EulerInterpolation.between([0, 0, 0], [1, 1, 1], "xxy")
+        euler_between([0, 0, 0], [1, 1, 1], "xxy")
     with pytest.raises(InputError, match="1 segments need 2 orientations, not 3"):
         EulerInterpolation(np.zeros((3, 3)), SegmentProgress.even(1.0), "xyz")
     with pytest.raises(InputError, match="finite triples"):
-        EulerInterpolation.between([0, 0, np.nan], [1, 1, 1], "xyz")
+        euler_between([0, 0, np.nan], [1, 1, 1], "xyz")
     with pytest.raises(InputError, match="2 orientations and 1 triples"):
         euler_interpolation(np.tile(np.eye(3), (2, 1, 1)), None, "xyz", typed=[None])

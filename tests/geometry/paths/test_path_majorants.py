@@ -7,10 +7,10 @@ from math import factorial
 
 import numpy as np
 import pytest
+from euler_curves import euler_between
 
 from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.chain import join
-from trajcli.geometry.paths.euler_interpolation import EulerInterpolation
 from trajcli.geometry.paths.orientation import (
     AxisAngleOrientation,
     FixedOrientation,
@@ -174,8 +174,8 @@ def test_rotations_turn_by_their_angles() -> None:
     axis = AxisAngleOrientation.between(np.eye(3), exp(2.0 * Z), 1.25)
     near(bounds(axis.majorant), turn(2.0 / 1.25))
     assert not bounds(FixedOrientation(np.eye(3), 1.0).majorant).any()
-    euler = EulerInterpolation.between([0.1, 0, 0.2], [1.1, 0, -0.4], "ZYZ", length=1.0)
-    slower = EulerInterpolation.between([0.1, 0, 0.2], [1.1, 0, 1.2], "ZYZ", length=1.0)
+    euler = euler_between([0.1, 0, 0.2], [1.1, 0, -0.4], "ZYZ", length=1.0)
+    slower = euler_between([0.1, 0, 0.2], [1.1, 0, 1.2], "ZYZ", length=1.0)
     near(bounds(slower.majorant), turn(2.0))  # both turn about the same axis while the second one rests
     assert (bounds(euler.majorant) >= largest(turn(0.4))).all()
 

@@ -53,28 +53,6 @@ class EulerInterpolation(OverSegments):
         if self.angles.shape[1:] != (3,) or not np.isfinite(self.angles).all():
             raise InputError(f"angles must be finite triples, they have shape {self.angles.shape}")
 
-    @classmethod
-    def between(
-        cls,
-        start: ArrayLike,
-        end: ArrayLike,
-        sequence: str,
-        frame: Frame = "current",
-        length: float | None = None,
-    ) -> EulerInterpolation:
-        """Return the interpolation from one triple (3,), rad, to another.
-
-        Args:
-            start: At s = 0.
-            end: At s = `length`.
-            sequence: Such as "ZYZ".
-            frame: Whether the axes move along.
-            length: How far s goes; None: as far as the triples are apart, rad.
-        """
-        angles = np.array([start, end], dtype=np.float64)
-        distance = float(np.linalg.norm(angles[1] - angles[0]))
-        return cls(angles, SegmentProgress.even(distance if length is None else length), sequence, frame)
-
     @property
     def angles_turned(self) -> Array:
         """Sums (k,), rad, of what the three angles change by in each segment."""
