@@ -220,14 +220,7 @@ def _together(parts: Sequence[_Chosen]) -> _Chosen:
 def _jumps(
     trajectory: Trajectory, order: int, peaks: IntervalPeaks, spans: NDArray[np.intp]
 ) -> Iterator[_Jumps]:
-    """Yield the two sides of all breaks, the first and the last included, many breaks at a time.
-
-    Args:
-        trajectory: What to look at.
-        order: Of the derivative.
-        peaks: `peaks_by_move(trajectory)`.
-        spans: Of each piece, its span, shape (pieces,).
-    """
+    """Yield the two sides of all breaks, the first and the last included, many breaks at a time."""
     curve, quantity = trajectory.curve, _QUANTITIES[order]
     peak = peaks.of_orders[order].magnitude.max(axis=0)
     nothing = np.zeros((1, curve.dimension))

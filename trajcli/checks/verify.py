@@ -406,16 +406,7 @@ def _with_remedy(
     *,
     alone: bool,
 ) -> Finding:
-    """Return the finding with what would fix it, where that is known.
-
-    Args:
-        finding: What is wrong.
-        trajectory: The whole.
-        span: Of the move that it is about.
-        promise: What that move says of itself.
-        factor: How many times longer the move must last for all its limits; None where that does not help.
-        alone: Whether a longer move has no finding left: else `slow` is no answer.
-    """
+    """Return the finding with what would fix it, where that is known."""
     hint = promise.remedies.get(finding.kind, finding.hint)
     if hint is None and finding.kind in KIND_OF:
         hint = _by_slowing(finding, trajectory, span, promise, factor, alone=alone)

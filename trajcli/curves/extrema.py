@@ -364,11 +364,7 @@ class _Windows:
 
 
 def _pieces_of(curve: PiecewisePolynomial, intervals: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the first and the last piece of which each of the intervals (m, 2) has a part, (m,).
-
-    Raises:
-        ValueError: When an interval is not within the curve.
-    """
+    """Return the first and the last piece of which each of the intervals (m, 2) has a part, (m,)."""
     start, end = intervals.T
     if not ((start >= curve.start) & (start <= end) & (end <= curve.end)).all():
         raise ValueError(f"interval outside the curve's domain [{curve.start!r}, {curve.end!r}]")

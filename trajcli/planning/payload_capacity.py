@@ -133,11 +133,7 @@ class _Search:
         return isinstance(plan, Plan) and plan.verdict.passed
 
     def feasible_mass(self) -> tuple[float, Plan]:
-        """Return a mass with which the job verifies, and its plan: none, or else that of the job.
-
-        Raises:
-            TrajcliError: Of the job without the payload.
-        """
+        """Return a mass with which the job verifies, and its plan: none, or else that of the job."""
         for mass in (0.0, self.template.mass):
             plan = self.attempt(mass)
             if isinstance(plan, Plan) and plan.verdict.passed:
@@ -160,12 +156,7 @@ class _Search:
             raise InputError(Problem(message, hint, place))
 
     def bracket(self) -> tuple[float, float | None]:
-        """Return a mass that verifies and one above it, as near as they get, that does not; None: any does.
-
-        Raises:
-            InputError: When no effort is limited where the payload is carried.
-            TrajcliError: Of the job without the payload.
-        """
+        """Return a mass that verifies and one above it, as near as they get, that does not; None: any."""
         feasible, plan = self.feasible_mass()
         self.require_limits(plan)
         low, high = self._bracket(feasible, plan)

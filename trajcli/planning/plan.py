@@ -167,12 +167,7 @@ def _plan_moves(
     adapted: Adaptation | None,
     known: KnownMoves,
 ) -> list[PlannedMove]:
-    """Return the moves of a job, and note how its poses are reached.
-
-    Raises:
-        MissingLimitError: With the limits that any of the moves lack: who adds them need not come again.
-        TrajcliError: Of the first move that has no curve.
-    """
+    """Return the moves of a job, and note how its poses are reached."""
     moves, lacking = list[PlannedMove](), list[Problem]()
     resolve = partial(_resolved, loaded=loaded, poses=poses, robot=loaded.robot)
     origin: Target | None
@@ -408,14 +403,7 @@ def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: Fl
 
 @contextmanager
 def _errors_of(loaded: LoadedJob, index: int, planner: Planner, begun: float) -> Iterator[None]:
-    """Give errors the move they are about, its place in the file, the job's units, and times since its start.
-
-    Args:
-        loaded: The job.
-        index: Of the move.
-        planner: Of the move.
-        begun: When the move begins, s from the start of the trajectory.
-    """
+    """Give errors the move they are about, its place, the job's units, and times since `begun`, s."""
     try:
         with _errors_at(loaded, loaded.place_of_move(index)):
             yield

@@ -85,13 +85,7 @@ def keep_further_limits(move: PlannedMove) -> PlannedMove:
 def _within_tool_limits(move: PlannedMove, over: Sequence[Finding], stretched: float) -> PlannedMove | None:
     """Return the move as fast as the limits of the tool let it be along its path, with an event.
 
-    Args:
-        move: That is over them.
-        over: Its findings.
-        stretched: Duration of the move when it is stretched, s.
-
-    Returns:
-        None where no motion is found that is faster than the move stretched.
+    None where that is no faster than the move stretched, which lasts `stretched` seconds.
     """
     if not any(KIND_OF[finding.kind].of_tool for finding in over):
         return None

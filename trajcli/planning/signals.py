@@ -70,11 +70,7 @@ def _errors_at(loaded: LoadedJob, index: int, number: int) -> Iterator[None]:
 
 
 def _within(signal: SignalAt, arrival: float, duration: float) -> float:
-    """Return when a signal is set that is named for an arrival, s.
-
-    Raises:
-        InputError: When that is outside of the job.
-    """
+    """Return when a signal is set that is named for an arrival, s."""
     time = arrival - signal.before
     if not -JUMP_ABSOLUTE <= time <= duration + JUMP_ABSOLUTE:
         raise InputError(

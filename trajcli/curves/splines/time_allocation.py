@@ -141,14 +141,7 @@ class _Point:
 
 
 def _centred(problem: _Problem, point: _Point, weight: float, enough: float) -> _Point:
-    """Return the minimiser of a barrier from a start inside the limits; a start outside comes back.
-
-    Args:
-        problem: What is solved.
-        point: The start.
-        weight: mu, s.
-        enough: The gain below which a step is the last one, of the sum of durations.
-    """
+    """Return the minimiser of a barrier from a start inside the limits; a start outside comes back."""
     for _ in range(_STEPS):
         if np.abs(point.y - point.origin).max() > _FAR:
             point = _renewed(problem, point)

@@ -176,12 +176,7 @@ class _Newton:
     matrix: BlockFactors
 
     def step(self, centre: float, before: _Pairs | None) -> tuple[Array, _Pairs]:
-        """Return the changes that make all products `centre`.
-
-        Args:
-            centre: What they shall be.
-            before: Changes whose products are taken off.
-        """
+        """Return the changes that make all products `centre`."""
         now = self.pairs
         less, more = (
             (0.0, 0.0) if before is None else (before.slack * before.dual, before.passed * before.over)

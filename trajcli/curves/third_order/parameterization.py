@@ -171,11 +171,7 @@ class _Search:
         self._take(law)
 
     def refine(self, most: int, hopeless: float) -> float:
-        """Refine the nodes while that pays; return the estimate of what is lost, in seconds.
-
-        Raises:
-            UnsettledSpeedError: When the first steps lead to more than `hopeless` times a limit.
-        """
+        """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
         self._step(_FIRST_GAP)
         self._converge(_FIRST_STEPS, hopeless)
         if self.excess.max() > hopeless:
@@ -211,13 +207,7 @@ class _Search:
             last = change
 
     def settle(self, most: int, steps: int, patience: float) -> None:
-        """Lower limits in the intervals that exceed them until little is left.
-
-        Args:
-            most: Number of nodes.
-            steps: As many at most.
-            patience: As many of them at most, one after another, that lead to nothing better.
-        """
+        """Lower limits in the intervals that exceed them until little is left."""
         lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, min(self.slower, _SETTLED))
         best, idle = self.stretch, 0
         for _ in range(steps):

@@ -297,15 +297,7 @@ def _judged(
     even: NDArray[np.bool_],
     before: GridSolution | None,
 ) -> GridSolution:
-    """Return the solution with its law and the excess of that; where it is wild, sdd is constant.
-
-    Args:
-        problem: What it solves.
-        rows: That it obeys.
-        speeds: sd^2 at its grid points.
-        even: In which intervals sdd is constant, shape (N,).
-        before: A solution of the same problem: what pieces of its law exceed is known.
-    """
+    """Return the solution with its law and the excess of that; where it is wild, sdd is constant."""
     while True:
         pieces = law_pieces(rows.grid, speeds.x, *end_accelerations(rows, speeds.x, speeds.mvc, even))
         before = GridSolution(problem, rows, speeds, pieces, _excess(problem, pieces, before), even)
@@ -327,12 +319,7 @@ def _excess(problem: PathProblem, pieces: LawPieces, before: GridSolution | None
 
 
 def _solution_on_grid(problem: PathProblem, grid: Array, before: GridSolution | None) -> GridSolution:
-    """Return the solution on a grid (N + 1,); one on another grid spares some work.
-
-    Raises:
-        UnreachableSpeedError: When there is no motion with the speeds at the ends.
-        UnlimitedSpeedError: When nothing limits the motion somewhere.
-    """
+    """Return the solution on a grid (N + 1,); one on another grid spares some work."""
     rows = interval_rows(grid, problem.constraints, problem.stops)
     return _judged(problem, rows, solve(rows, *problem.ends), np.zeros(grid.size - 1, dtype=bool), before)
 

@@ -166,9 +166,9 @@ class FrameTransport:
 
 
 def derivative(coefficients: Array) -> Array:
-    """Return the coefficients (degree, 3) of the derivative, highest power first."""
-    degree = coefficients.shape[0] - 1
-    return coefficients[:-1] * np.arange(degree, 0, -1.0)[:, None]
+    """Return the coefficients of the derivatives of polynomials (degree + 1, ...), highest power first."""
+    powers = np.arange(len(coefficients) - 1.0, 0.0, -1.0)
+    return coefficients[:-1] * powers.reshape(-1, *([1] * (coefficients.ndim - 1)))
 
 
 def values(coefficients: Array, u: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.frozen import frozen
-from trajcli.geometry.paths.arc_length import inverted_length
+from trajcli.geometry.paths.arc_length import derivative, inverted_length
 from trajcli.geometry.paths.corner import Blend
 from trajcli.geometry.paths.position import Line, PartOfCurve, PositionCurve, Triple
 from trajcli.geometry.rotation import Array
@@ -128,7 +128,7 @@ class _Blends:
     def evaluate(self, number: Indices, local: Array) -> Array:
         """Return p, p', p'', shape (3, N, 3)."""
         rows = self.coefficients[:, number]
-        slopes = _slope(rows)
+        slopes = derivative(rows)
         panel = self._panel(number, local)
         u = inverted_length(
             self.squares[:, number],
@@ -136,7 +136,7 @@ class _Blends:
             self.lengths[panel + 1] - self.lengths[panel],
             local - self.lengths[panel],
         )
-        position, slope, bend = (_at(each, u) for each in (rows, slopes, _slope(slopes)))
+        position, slope, bend = (_at(each, u) for each in (rows, slopes, derivative(slopes)))
         speed = np.linalg.norm(slope, axis=-1, keepdims=True)
         first = slope / speed
         across = bend - (bend * first).sum(axis=-1, keepdims=True) * first
@@ -187,17 +187,11 @@ def _table_of_blends(blends: Sequence[Blend]) -> _Blends:
 
 def _squares(coefficients: Array) -> Array:
     """Return the coefficients (9, k) of |r'(u)|^2, of those of r, (6, k, 3)."""
-    slopes = _slope(coefficients)
+    slopes = derivative(coefficients)
     result = np.zeros((2 * len(slopes) - 1, coefficients.shape[1]))
     for k, row in enumerate(slopes):
         result[k : k + len(slopes)] += np.einsum("pki,ki->pk", slopes, row)
     return result
-
-
-def _slope(coefficients: Array) -> Array:
-    """Return the coefficients of the derivatives of polynomials (degree + 1, ...)."""
-    powers = np.arange(len(coefficients) - 1.0, 0.0, -1.0)
-    return coefficients[:-1] * powers.reshape(-1, *([1] * (coefficients.ndim - 1)))
 
 
 def _at(coefficients: Array, u: Array) -> Array:

@@ -136,11 +136,7 @@ def _near(robot: Robot, near: ArrayLike | None, batch: tuple[int, ...]) -> Array
 
 
 def _is_unturned(robot: Robot, arm: AxisGeometry, target: IkTarget) -> bool:
-    """Return whether no joint turns the tool axis that a target means.
-
-    Raises:
-        InputError: When its yaw is asked for, and it is always vertical.
-    """
+    """Return whether no joint turns the tool axis that a target means."""
     from trajcli.kinematics.inverse.tool_axis import always_vertical, fixed_axis
 
     unturned = fixed_axis(arm, target.tool_axis)

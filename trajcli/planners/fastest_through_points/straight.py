@@ -128,6 +128,7 @@ def _rate(problem: WaypointProblem, point: int, order: int, line: Array, names: 
 def _require_along(
     values: Array, wanted: Array, given: NDArray[np.bool_], order: int, point: int, names: list[str]
 ) -> None:
+    """Refuse a velocity or acceleration that leaves the line."""
     off = np.where(given, np.abs(values - wanted), 0.0)
     joint = int(off.argmax())
     if off[joint] <= _PARALLEL * np.abs(values).max():
@@ -141,6 +142,7 @@ def _require_along(
 
 
 def _moves_at_turn(values: Array, point: int, order: int, names: list[str]) -> PlanningError:
+    """Return the error of a velocity or acceleration that is given where the polyline turns."""
     joint = int(np.abs(values).argmax())
     quantity = ("velocity", "acceleration")[order - 1]
     message = f"`straight` stops at point {point}, where the line turns: {{joint}} has {quantity} {{value}}"

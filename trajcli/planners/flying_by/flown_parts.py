@@ -133,11 +133,7 @@ def along_course(
 def _along_line(
     course: Course, part: PathPart, stretch: tuple[float, float], states: Array, index: int
 ) -> FlownPart:
-    """Return the fastest motion between two states along a straight line in joint space.
-
-    Raises:
-        NoLawError: When its law is one that goes back.
-    """
+    """Return the fastest motion between two states along a straight line in joint space."""
     (v0, a0), (v1, a1) = states.tolist()
     begin, end = stretch
     bounds = part.bounds.reshape(3, 2)

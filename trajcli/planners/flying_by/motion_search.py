@@ -256,14 +256,7 @@ def duration_of(parts: Sequence[FlownPart]) -> float:
 
 
 def _found(row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twice: bool) -> FoundStates:
-    """Return the states that are found for a row of nodes and parts.
-
-    Args:
-        row: Nodes and parts.
-        ends: States at the start and at the end.
-        near: States of a row that is much the same, where there is one.
-        twice: Whether to search from the end, too, whose way back takes as long, and to take the better.
-    """
+    """Return the states that are found for a row of nodes and parts."""
     forward = begin_search(row.nodes, row.parts, ends, near)
     if not twice:
         return forward.until().found()

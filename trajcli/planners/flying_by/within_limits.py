@@ -133,11 +133,7 @@ def _has_length(move: PlannedMove) -> bool:
 
 
 def _require_limits(moves: Sequence[PlannedMove], robots: Sequence[Robot]) -> None:
-    """Refuse joints without the limits that a motion through a zone follows from.
-
-    Raises:
-        MissingLimitError: Names them.
-    """
+    """Refuse joints without the limits that a motion through a zone follows from."""
     for move, robot in zip(moves, robots, strict=True):
         for quantity in ("velocity", "acceleration"):
             lacking = np.flatnonzero(~np.isfinite(getattr(robot.limits, quantity)).all(axis=1))
@@ -149,11 +145,7 @@ def _require_limits(moves: Sequence[PlannedMove], robots: Sequence[Robot]) -> No
 
 
 def _rates_along(course: Course, start: State) -> Array:
-    """Return sd and sdd of a course under which the joints start as they do.
-
-    Raises:
-        PlanningError: When they do not start along it.
-    """
+    """Return sd and sdd of a course under which the joints start as they do."""
     if start.at_rest:
         return np.zeros(2)
     from trajcli.planners.point_to_point.jerk_limited import rate_along

@@ -1,7 +1,4 @@
-"""Jerk-limited motions of all joints: each by itself, all together in time, or all on one line.
-
-Source: Berscheid and Kroeger (2021).
-"""
+"""Jerk-limited motions of all joints: each by itself, all together in time, or all on one line."""
 
 from __future__ import annotations
 
@@ -292,11 +289,7 @@ def _boundaries(request: Request, robot: Robot) -> list[BoundaryProblem]:
 def _lasting(
     boundary: BoundaryProblem, profile: PhaseProfile, duration: float, joint: int
 ) -> PiecewisePolynomial:
-    """Return the curve of a joint; it keeps its end state until the others have arrived.
-
-    Raises:
-        PlanningError: When it cannot, because it moves.
-    """
+    """Return the curve of a joint; it keeps its end state until the others have arrived."""
     if profile.duration == duration:
         return profile.curve()
     if boundary.steady:
@@ -353,9 +346,6 @@ def _require_limits(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None
     """Refuse moving joints without the limits that their motion follows from.
 
     Without a limit on the jerk the acceleration steps, and limits itself what a motion follows from.
-
-    Raises:
-        MissingLimitError: With one problem for each quantity, naming the joints.
     """
     problems: list[Problem] = []
     if np.isfinite(robot.limits.velocity).all() and np.isfinite(robot.limits.acceleration).all():
@@ -376,11 +366,7 @@ def _require_limits(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None
 
 
 def _require_possible_end(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None:
-    """Refuse end states that lie outside the limits, or that can only be reached from outside.
-
-    Raises:
-        PlanningError: With one problem for each joint.
-    """
+    """Refuse end states that lie outside the limits, or that can only be reached from outside."""
     problems = [
         problem for joint, boundary in enumerate(boundaries) for problem in _end_problems(boundary, joint)
     ]
@@ -432,11 +418,7 @@ def _approach_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
 def _require_common_law(
     law: BoundaryProblem, boundaries: Sequence[BoundaryProblem], direction: Array, robot: Robot
 ) -> None:
-    """Refuse ends that each joint by itself can keep within its limits, but not with the jerk of one law.
-
-    Raises:
-        PlanningError: Names the joint whose velocity limit would be exceeded.
-    """
+    """Refuse ends that each joint by itself can keep within its limits, but not with the jerk of one law."""
     ends = ((law.initial, 1, "from its start"), (law.final, -1, "before its end"))
     for k, ((_, velocity, acceleration), sign, when) in enumerate(ends):
         alone = [_beyond(b.final if k else b.initial, sign, b.bounds) for b in boundaries]

@@ -1,7 +1,4 @@
-"""Cubic, quintic and septic polynomials between two boundary states, and their shortest duration.
-
-Source: Siciliano et al. (2009), section 4.2.1; Biagiotti and Melchiorri (2008), section 2.1.
-"""
+"""Cubic, quintic and septic polynomials between two boundary states, and their shortest duration."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Trapezoidal velocity: one law for all joints, or one for each.
-
-Source: Siciliano et al. (2009), section 4.2.1.
-"""
+"""Trapezoidal velocity: one law for all joints, or one for each."""
 
 from __future__ import annotations
 
@@ -262,15 +259,7 @@ def _cannot_wait(joint: int, arrival: float, duration: float, end: State, robot:
 def _infeasible(
     error: InfeasibleProfileError, joint: int, size: float, move: Trapezoid, robot: Robot
 ) -> PlanningError:
-    """Return the error in terms of one joint.
-
-    Args:
-        error: In units of the law.
-        joint: The joint that rules.
-        size: Joint units per unit of the law.
-        move: The move that has no such profile.
-        robot: For the names.
-    """
+    """Return the error in terms of one joint."""
     name = robot.joint_names[joint]
     amounts: dict[str, Amount | str] = {"joint": name}
     if error.reason in ("speed", "acceleration"):

@@ -1,7 +1,4 @@
-"""Circular arcs and helices of the tool.
-
-Source: Siciliano et al. (2009), section 4.3.1.
-"""
+"""Circular arcs and helices of the tool."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Straight lines, pure rotations, and screw motions of the tool.
-
-Source: Siciliano et al. (2009), section 4.3; Lynch and Park (2017), section 9.2.1.
-"""
+"""Straight lines, pure rotations, and screw motions of the tool."""
 
 from __future__ import annotations
 

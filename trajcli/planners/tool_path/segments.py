@@ -161,11 +161,7 @@ def _from_file(value: Mapping[str, Any], context: ReadingContext) -> RecordedPos
 
 
 def _within(key: str, read: Callable[[], T]) -> T:
-    """Return what is read below a key.
-
-    Raises:
-        FlawError: With the key.
-    """
+    """Return what is read below a key."""
     try:
         return read()
     except FlawError as error:

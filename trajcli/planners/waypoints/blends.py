@@ -1,7 +1,4 @@
-"""Linear segments with parabolic blends, and their times and durations where only the limits say so.
-
-Source: Siciliano et al. (2009), section 4.2.2; Craig (2005), section 7.3.
-"""
+"""Linear segments with parabolic blends, and their times and durations where only the limits say so."""
 
 from __future__ import annotations
 

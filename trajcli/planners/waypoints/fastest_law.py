@@ -87,11 +87,7 @@ def solve_within_jerk(
 
 @contextmanager
 def _ends_refused() -> Iterator[None]:
-    """Say by how much velocities at the ends are too high.
-
-    Raises:
-        PlanningError: When they are.
-    """
+    """Say by how much velocities at the ends are too high."""
     try:
         yield
     except UnreachableSpeedError as error:

@@ -1,7 +1,4 @@
-"""Splines through waypoints, at times that are given or that the limits allow.
-
-Source: Siciliano et al. (2009), section 4.2.2; Biagiotti and Melchiorri (2008), chapter 4.
-"""
+"""Splines through waypoints, at times that are given or that the limits allow."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Time-optimal motion through waypoints: a path in joint space, and the fastest law along it.
-
-Source: Pham and Pham (2018).
-"""
+"""Time-optimal motion through waypoints: a path in joint space, and the fastest law along it."""
 
 from __future__ import annotations
 
@@ -281,11 +278,7 @@ class TimeOptimal(ThroughPoints):
         return PhasePlane(motion.law, constraints, path.curve.breaks, motion.stops, dimension)
 
     def _in_one_point(self, start: State, points: PointTable, robot: Robot) -> Planned:
-        """Return the move all of whose points are one.
-
-        Raises:
-            PlanningError: When the arm moves there, unless it has arrived already: no path leads back.
-        """
+        """Return the move all of whose points are one."""
         arrived = same_state(start, points.target) and not self.duration
         if arrived or not points.rates.any():
             return standstill(points.target, self.duration or 0.0, REMEDIES)

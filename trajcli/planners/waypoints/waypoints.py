@@ -1,7 +1,4 @@
-"""Jerk-limited motion through waypoints, with free geometry between them.
-
-Source: Berscheid and Kroeger (2021); Nocedal and Wright (2006), chapter 18.
-"""
+"""Jerk-limited motion through waypoints, with free geometry between them."""
 
 from __future__ import annotations
 
@@ -269,11 +266,7 @@ def _problem(points: GivenPoints, robot: Robot, joints: NDArray[np.intp]) -> Way
 
 
 def _require_limits(points: GivenPoints, robot: Robot) -> None:
-    """Refuse moving joints without the limits that their motion follows from.
-
-    Raises:
-        MissingLimitError: With one problem for each quantity, naming the joints.
-    """
+    """Refuse moving joints without the limits that their motion follows from."""
     problems: list[Problem] = []
     for order in (1, 2, 3):
         bounded = np.isfinite(robot.limits.of_order(order)).all(axis=1)

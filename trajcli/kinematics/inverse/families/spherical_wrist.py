@@ -117,16 +117,7 @@ def _last(
     flags: DegeneracyFlags,
     sign: float,
 ) -> Turn | Mirrored:
-    """Return the turn about the last axis: it brings the tool's view of the first axis to where it must be.
-
-    Args:
-        directions: Of the three axes at zero.
-        bend: The turns about the second.
-        first_axis: Where the first axis points.
-        goal: The displacement of the tool.
-        flags: Right after the turns about the first two, so that their choice is its last.
-        sign: Of the sine of the first solution's bend.
-    """
+    """Return the turn about the last axis that brings the tool's view of the first to where it must be."""
     first, second, last = directions
     if square_wrist(first, second, last):
         second = second if sign > 0.0 else (-second[0], -second[1], -second[2])
