@@ -172,6 +172,16 @@ def test_a_new_place_is_where_speeding_up_meets_braking_or_the_middle():
     assert refined(grid, x, np.array([1, 2, 1])).size == 5
 
 
+@pytest.mark.full
+def test_limits_are_lowered_in_places_until_little_of_a_long_motion_is_stretched():
+    """It was stretched by 1.4 % for a single interval that passed its limit; what is lost else is that of the grid."""
+    rng = np.random.default_rng(12)
+    path = spline(rng.uniform(-1, 1, (3001, 6)))
+    found = time_optimal(path, *random_bounds(rng, 6))
+    assert found.stretch <= 1.0005
+    assert found.trajectory.duration <= 1.005 * found.lower_bound
+
+
 @pytest.mark.soak
 def test_ten_thousand_points():
     rng = np.random.default_rng(10)
@@ -179,5 +189,5 @@ def test_ten_thousand_points():
     velocity, acceleration = random_bounds(rng, 6)
     found = time_optimal(path, velocity, acceleration)
     assert found.grid.size <= 20 * 10000 + 4001
-    assert found.stretch <= 1.002
+    assert found.stretch <= 1.0005
     assert_motion(found, path, velocity, acceleration)

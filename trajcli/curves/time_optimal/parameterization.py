@@ -51,7 +51,7 @@ _SETTLED = 0.01  # of what is lost elsewhere: then switching points still move b
 _FEW_NEW = 0.1  # of the intervals: for fewer new ones the whole solution is not worth finding again
 _ROUNDS = 8  # of refinement
 _TRIES = 4  # of halving the grid before a speed at an end is called too high
-_TIGHTENINGS, _MOST_TIGHTENINGS = 8, 40  # where the rest is stretched away, and where it must not be
+_TIGHTENINGS, _MOST_TIGHTENINGS = 8, 40  # where little is stretched away, and where much is, or must not be
 _LOWERED = (
     1.1,
     1.2,
@@ -69,7 +69,7 @@ _EXTRA = 1e-9  # of a limit: taken off beyond that
 _MOST_LOWERED = 0.2  # of a limit: no more of its excess is taken off it at a time
 _STUBBORN = 1e-5  # of a limit: where it is passed by more in the end, sdd shall not change
 _PATIENCE = 3  # rounds after which that is decided
-_LITTLE = 2e-5  # of the duration: so much is left to a stretch
+_LITTLE, _MUCH = 2e-5, 5e-4  # of the duration: so much is left to a stretch; so much is worth more rounds
 _EXACT = 1e-10  # a limit exceeded by less is kept
 
 
@@ -366,7 +366,7 @@ def _tightened_solution(solution: GridSolution) -> tuple[GridSolution, int]:
     """
     rests = solution.problem.rests
     tightened, best = np.zeros(solution.x.size - 1, dtype=bool), solution
-    for turn in range(_TIGHTENINGS if rests else _MOST_TIGHTENINGS):
+    for turn in range(_MOST_TIGHTENINGS):
         exceeded = solution.excess > 1.0 + _EXACT
         if not exceeded.any() or (rests and solution.needed <= 1.0 + _LITTLE):
             break
@@ -379,6 +379,7 @@ def _tightened_solution(solution: GridSolution) -> tuple[GridSolution, int]:
         before, now = best.duration * best.needed, solution.duration * solution.needed
         if not rests or now < before:
             best = solution
-        if rests and turn > _PATIENCE + 1 and now > before * (1.0 - _LITTLE):
+        idle = turn > _PATIENCE + 1 and now > before * (1.0 - _LITTLE)
+        if rests and best.needed <= 1.0 + _MUCH and (idle or turn + 1 == _TIGHTENINGS):
             break
     return best, int(tightened.sum())
