@@ -254,3 +254,28 @@ def test_of_two_large_changes_side_by_side_the_larger_one_is_the_jump(at: int, s
     velocity = np.array([[-0.3, 0.3]])
     (found,) = inconsistent(rows(q), replace(unlimited(1), velocity=velocity))
     assert (found.kind, found.row, found.count) == ("jump", at + 1, 1)
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.2, True)])
+def test_a_jump_may_be_as_much_larger_as_both_rows_are_rounded(share: float, broken: bool, side: int) -> None:
+    q = np.zeros(COUNT)
+    q[12:] = side * (2.0 * (DENSE[12] - DENSE[11]) + share * 2 * OFF)
+    velocity = np.array([[-1.0, 2.0] if side > 0 else [-2.0, 1.0]])
+    found = inconsistent(rows(q, q=OFF), replace(unlimited(1), velocity=velocity))
+    assert [each.kind for each in found] == (["jump"] if broken else [])
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.1, True)])
+def test_without_limits_of_jerk_an_acceleration_steps_between_its_limits(
+    share: float, broken: bool, side: int
+) -> None:
+    """Rows state none, and between them it may be anything: the gain may differ by 2 a T."""
+    t, length, a = 0.5 * np.arange(12.0), 0.5, 2.0
+    gain = side * share * 2 * a * length
+    speed = gain * (np.arange(12) % 2)
+    moved = np.append(0.0, np.cumsum(np.full(11, gain / 2 * length)))
+    limits = replace(unlimited(1), acceleration=np.array([[-a, a]]))
+    found = inconsistent(rows(moved, speed, np.zeros(12), t=t), limits)
+    assert [each.quantity for each in found] == (["acceleration"] if broken else [])

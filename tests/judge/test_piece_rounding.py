@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicSpline
 
-from trajcli.judge.rounding import PieceRows
+from trajcli.judge.rounding import PieceRows, stated_errors
 
 Array = NDArray[np.float64]
 U = np.linspace(0.0, 1.0, 41)
@@ -154,3 +154,11 @@ def test_rows_that_agree_with_each_other_are_off_by_their_stamps_alone(sign: flo
     assert error(*steady, 3) == pytest.approx(6.0 * gain, rel=1e-3)
     assert error(*bent, 2) == pytest.approx(10 / np.sqrt(3) * way, rel=1e-3)
     assert error(*bent, 3) == pytest.approx(60.0 * way + 2 * abs(a) * late, rel=1e-3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("size", [0.0, 1e-3, 3.0, 1e6])
+def test_numbers_of_all_digits_are_off_by_a_few_units_in_the_last_place(size: float, sign: float) -> None:
+    """Three sums and a product, each rounded to the nearest, are off by two units: that much, and not ten times it."""
+    error = float(stated_errors(np.array([[sign * size]]), np.zeros(1), 0.0)[0, 0])
+    assert 2 * np.spacing(size) <= error <= 20 * np.spacing(size)
