@@ -111,6 +111,15 @@ def test_durations_against_toppra(name, seed):
     assert motion.trajectory.duration <= 1.003 * toppra_duration(robot, points, 800)
 
 
+def test_where_a_grid_lets_nothing_move_on_it_is_made_finer():
+    """Next to its end the arm stands between two places of the first grid: nearer ones leave it a speed."""
+    robot = arm("xarm7")
+    path, points = spline_of(robot, 15)
+    motion = solved(path, robot)
+    assert np.abs(shares(motion.trajectory, robot)).max() <= 1 + 1e-6
+    assert motion.trajectory.duration <= 1.003 * toppra_duration(robot, points, 800)
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("name", EFFORTS)
 def test_durations_against_toppra_on_many_splines(name):

@@ -20,6 +20,7 @@ from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstra
 from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
 from trajcli.curves.time_optimal.passes import (
     Speeds,
+    StandstillError,
     UnlimitedSpeedError,
     UnreachableSpeedError,
     solve,
@@ -319,9 +320,17 @@ def _excess(problem: PathProblem, pieces: LawPieces, before: GridSolution | None
 
 
 def _solution_on_grid(problem: PathProblem, grid: Array, before: GridSolution | None) -> GridSolution:
-    """Return the solution on a grid (N + 1,); one on another grid spares some work."""
+    """Return the solution on a grid (N + 1,); one on another grid spares some work.
+
+    Raises:
+        StandstillError: When it stands still from one grid point to the next.
+    """
     rows = interval_rows(grid, problem.constraints, problem.stops)
-    return _judged(problem, rows, solve(rows, *problem.ends), np.zeros(grid.size - 1, dtype=bool), before)
+    speeds = solve(rows, *problem.ends)
+    still = np.flatnonzero(np.maximum(speeds.x[1:], speeds.x[:-1]) <= 0.0)
+    if still.size:
+        raise StandstillError(float(grid[still[0]]))
+    return _judged(problem, rows, speeds, np.zeros(grid.size - 1, dtype=bool), before)
 
 
 def _refined_solution(problem: PathProblem) -> tuple[GridSolution, int, float]:
@@ -331,7 +340,7 @@ def _refined_solution(problem: PathProblem) -> tuple[GridSolution, int, float]:
     for rounds in range(_ROUNDS + 1):
         try:
             before = solution = _solution_on_grid(problem, grid, before)
-        except UnreachableSpeedError:  # a finer grid has room for a little more
+        except (StandstillError, UnreachableSpeedError):  # a finer grid has room for a little more
             if rounds >= _TRIES or 2 * grid.size > most:
                 raise
             grid = halved(grid)

@@ -23,6 +23,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.curves.time_optimal.collocation import IntervalRows
 from trajcli.curves.time_optimal.maximum_velocity import largest_in_intervals, maximum_velocity_curve
 from trajcli.curves.time_optimal.recurrence import solve_recurrence
+from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
 
 _SAME = 1e-12
@@ -45,6 +46,13 @@ class UnreachableSpeedError(ValueError):
             f"path velocity {speed:.9g} at the {end}, s = {s:.9g}, is too high: at most {allowed:.9g} is "
             "possible"
         )
+
+
+class StandstillError(PlanningError):
+    """Within the limits nothing moves on from a place, as where gravity takes all of an effort."""
+
+    def __init__(self, s: float) -> None:
+        super().__init__(f"the limits let nothing move on from s = {s:.9g}", hint="raise limits of effort")
 
 
 class UnlimitedSpeedError(ValueError):
