@@ -74,4 +74,4 @@ def test_as_fast_as_toppra_on_fifty_splines(points):
         if theirs is not None:
             assert found.trajectory.duration <= 1.002 * theirs, f"seed {seed}"
             if points <= 20:
-                assert found.trajectory.duration >= 0.998 * theirs, f"seed {seed}"
+                assert found.trajectory.duration >= 0.99 * theirs, f"seed {seed}"
