@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
+from test_zone_between_velocities import fastest as fastest_alone
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.kinematics.robot import Limits
@@ -135,3 +136,53 @@ def test_next_to_a_stop_the_jerk_of_the_direction_counts(sign: float, *, at_end:
     for other, possible in ((fast, False), (slow, True)):
         found = lasting(part, *((other, (0.0, 0.0)) if at_end else ((0.0, 0.0), other)))
         assert (found < LONGEST) == possible
+
+
+MONOTONE = {
+    "more": [1.0, 0.0, 0.02, 0.0],
+    "less": [1.0, -3.0, 3.02, 0.0],
+    "both": [2.0, -3.0, 1.6, 0.0],
+    "straight": [0.0, 0.0, 1.0, 0.0],
+}
+"""Polynomials that rise from 0 to 1, whose slopes differ within a cell."""
+
+
+def alone(pieces: Array, velocity: float, acceleration: tuple[float, float]) -> CoursePart:
+    """Return the course of one joint from 0.1 to 0.9, in one piece or two."""
+    breaks = np.linspace(0.0, 1.01, len(pieces) + 1)
+    curve = PiecewisePolynomial(breaks, pieces.T[:, :, None])
+    limits = Limits(
+        *(np.array([row]) for row in ([-(LOOSE**2), LOOSE**2], [-velocity, velocity])),
+        np.array([[-acceleration[0], acceleration[1]]]),
+        np.array([[-np.inf, np.inf]]),
+    )
+    course: Any = SimpleNamespace(curve=curve, robot=SimpleNamespace(limits=limits), limits_along=None)
+    return course_part(course, (0.1, 0.9), (False, False))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("velocity", [0.6, 9.0])
+@pytest.mark.parametrize("name", MONOTONE)
+def test_of_one_joint_alone_it_is_never_above_its_fastest_motion(
+    name: str, velocity: float, sign: float
+) -> None:
+    """However its path is bent over s, the joint goes its way as on a straight line; strong bends widen cells."""
+    row = sign * np.array(MONOTONE[name])
+    part = alone(row[None], velocity, (5.0, 2.0))
+    step = np.polyval(row, 0.9) - np.polyval(row, 0.1)
+    v0, v1 = np.polyval(np.polyder(row), [0.1, 0.9])
+    for first, last in ((0.1, 0.1), (0.05, 0.25), (0.25, 0.05)):
+        exact = fastest_alone(step, v0 * first, v1 * last, (-velocity, velocity, 5.0, 2.0))
+        bound = lasting(part, (first, first), (last, last))
+        assert (0.7 if velocity < 1 else 0.05) * exact <= bound <= exact * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("slopes", [(1.0, 3.0), (3.0, 1.0)])
+def test_a_break_within_a_cell_parts_it(slopes: tuple[float, float], sign: float) -> None:
+    """At the largest velocity throughout the joint takes its way by it, behind the break as before."""
+    half = 0.505
+    part = alone(sign * np.array([[slopes[0], 0.0], [slopes[1], half * slopes[0]]]), 0.5, (1e9, 1e9))
+    exact = ((half - 0.1) * slopes[0] + (0.9 - half) * slopes[1]) / 0.5
+    bound = lasting(part, *((0.5 / slope,) * 2 for slope in slopes))
+    assert 0.95 * exact <= bound <= exact * (1 + 1e-9)
