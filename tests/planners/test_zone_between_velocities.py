@@ -52,13 +52,16 @@ def test_between_two_velocities_it_is_the_fastest_motion(
     assert lasting([step], first, last, turns) == pytest.approx(exact, rel=1e-6)
 
 
+@pytest.mark.parametrize("more", [1e-9, 0.0])
 @pytest.mark.parametrize(("brake", "gain"), [(BRAKE, GAIN), (GAIN, BRAKE)])
-@pytest.mark.parametrize(("v0", "v1"), [(0.2, 0.9), (0.9, 0.2)])
-def test_what_one_ramp_goes_takes_its_time(v0: float, v1: float, brake: float, gain: float) -> None:
+@pytest.mark.parametrize(("v0", "v1"), [(0.2, 0.9), (0.9, 0.2), (0.1, 0.4), (0.7, 0.3)])
+def test_what_one_ramp_goes_takes_its_time(
+    v0: float, v1: float, brake: float, gain: float, more: float
+) -> None:
     """A step that is shorter by rounding would be another motion: the joint has to turn back before it."""
     rate = gain if v1 > v0 else brake
     time, limits = abs(v1 - v0) / rate, (np.array([[LOW, HIGH]]), np.array([[-brake, gain]]))
-    passage = ZonePassage(np.array([0.5 * (v0 + v1) * time + 1e-9]), np.ones(1), np.ones(1), *limits)
+    passage = ZonePassage(np.array([0.5 * (v0 + v1) * time + more]), np.ones(1), np.ones(1), *limits)
     found = passage.durations(np.array([[v0, v0]]), np.array([[v1, v1]]), 50.0)
     assert found[0, 0] == pytest.approx(time, rel=1e-6)
 

@@ -30,6 +30,9 @@ _STILL = 1e-3  # of the largest q': a joint that moves less may be moved by roun
 _ROUNDS = 6  # of halving
 _HALVINGS = 30  # of a duration through a zone
 _LARGE = 1e100  # stands for no bound
+_ROUNDING = (
+    1e-12  # of a step: one that is a ramp's own must not be less by rounding, as that would last much longer
+)
 _DIGIT = 1e-6  # s, to which a bound is rounded down: last bits of processors do not show
 SAFE = 1e-9  # relative: taken off, for the rounding of sums
 
@@ -298,8 +301,8 @@ def _until(since: Array, passage: tuple[Array, ...], longest: float) -> Array:
             accelerations a and b, and its largest velocity v, each broadcast to (n, p, q).
         longest: The longest duration that matters, s.
     """
-    rows = np.broadcast_arrays(since[None], *passage)
-    low = np.array(rows[0])
+    rows = list(np.broadcast_arrays(since[None], *passage))
+    low, rows[1] = np.array(rows[0]), rows[1] - _ROUNDING * np.abs(rows[1])
     short = _farthest(low, *rows[2:]) < rows[1]
     some = [row[short] for row in rows[1:]]
     below, above = low[short], np.full(int(short.sum()), longest)
