@@ -195,14 +195,14 @@ def test_what_is_carried_and_not_judged_is_said(limits, unjudged) -> None:
 def test_limits_that_are_lowered_in_vain_leave_the_law(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where lower limits change no speed, nothing is judged anew: the selection of what changed is empty."""
     changed: list[bool] = []
-    differ = LawPieces.differ
+    among = LawPieces.among
 
-    def noted(self: LawPieces, other: LawPieces) -> NDArray[np.bool_]:
-        found = differ(self, other)
-        changed.append(bool(found.any()))
+    def noted(self: LawPieces, others: LawPieces) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        found = among(self, others)
+        changed.append(not found[1].all())
         return found
 
-    monkeypatch.setattr(LawPieces, "differ", noted)
+    monkeypatch.setattr(LawPieces, "among", noted)
     inertia, coulomb, effort = 0.02 + 2 * 0.3**2, 1.5, 5.0
     link = {"mass": 2, "com": [0, 0, 0], "inertia": [0.02, 0.02, 0.02, 0, 0, 0]}
     turn = {"a": 0.3, "velocity": 3, "acceleration": 30, "effort": effort, "friction": {"coulomb": coulomb}}
