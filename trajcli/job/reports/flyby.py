@@ -51,7 +51,7 @@ class ZoneReport(ReportPart):
     binds: Annotated[str, described("The limit of a joint that is used most in it.")]
     lowered: Annotated[
         float | None,
-        described("Part of the pace that its joints allow, where other limits lower it; else null."),
+        described("Part of the full pace at which its joints use what other limits leave them; else null."),
     ] = None
 
 
