@@ -198,6 +198,15 @@ def test_where_an_acceleration_leads_is_excused_in_either_direction(side, how):
     assert _findings(_motion(0.9 * side, 2.0 * side, later), _limits(), how) == [("a", "velocity")]
 
 
+@pytest.mark.parametrize("how", ["each", "line"])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_acceleration_that_leads_outside_by_little_is_excused(side, how):
+    """From 0.9 rad/s with 1 rad/s^2 it reaches 0.9 + 1 / (2 * 4) = 1.025; with twice the jerk it would stay inside."""
+    leads = _motion(0.9 * side, side, [(0.5, -4.0 * side), (0.25, 4.0 * side)])
+    assert _findings(leads, _limits(), how) == []
+    assert _findings(leads, _limits(), None) == [("a", "velocity")]
+
+
 def test_two_joints_that_brake_are_each_excused():
     """One forward, one backward, from other speeds."""
     first, second = (
