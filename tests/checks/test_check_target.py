@@ -38,6 +38,7 @@ def test_right_ends_pass():
     assert check_targets(swing(), to_joints(END)) == []
     assert check_targets(swing(), to_pose(pose_target(forward(ROBOT, END)))) == []
     assert check_targets(swing(), [Promise()]) == []
+    assert check_targets(swing(), [Promise(robot=ROBOT, destination=Destination(END))]) == []
 
 
 @pytest.mark.parametrize("off", [1e-8, -0.3])
@@ -46,6 +47,7 @@ def test_a_mutant_that_ends_beside_its_joints(off):
     (finding,) = check_targets(swing(mutant), to_joints(END))
     assert (finding.kind, finding.move, finding.joint, finding.time) == ("target", 0, "j3", 2.0)
     assert finding.value == pytest.approx(abs(off), rel=1e-6)
+    assert finding.si_unit == "rad"
     assert "beside its target at t = 2 s" in finding.text()
 
 

@@ -57,11 +57,12 @@ def test_a_mutant_is_found(mutant, joint, time, value):
     assert finding.value == pytest.approx(value, rel=1e-6)
 
 
+@pytest.mark.parametrize("times", [[0.0, 2.5, 3.5], [0.0, 2.3, 3.2], [0.0, 2.8, 3.7]])
 @pytest.mark.parametrize("together", [1, 2, 100])
-def test_too_late_is_not_there(together, monkeypatch):
+def test_too_late_is_not_there(together, times, monkeypatch):
     """The point that is furthest off is named, once for each joint, in whichever block it is."""
     monkeypatch.setattr("trajcli.checks.via_points._BLOCK", together)
-    late = promise([0.0, 2.5, 3.5])
+    late = promise(times)
     found = check_waypoints(trajectory(passing()), [late])
     away = np.abs(passing().evaluate(late.times) - POINTS)
     worst = {f"j{k + 1}": (late.times[away[:, k].argmax()], away[:, k].max()) for k in range(2)}
@@ -90,9 +91,10 @@ def test_times_are_those_of_the_move():
     assert {finding.move for finding in wrong} == {1}
 
 
-def test_rounding_is_no_miss():
+@pytest.mark.parametrize("away", [1e6, -1e6])
+def test_rounding_is_no_miss(away):
     """A point 1e6 away is met when all but the last digits agree."""
-    far = POINTS + 1e6
+    far = POINTS + away
     curve = trajectory(between(*far.tolist()))
     assert check_waypoints(curve, [promise(points=far * (1 + 2e-16))]) == []
     assert check_waypoints(curve, [promise(points=far + 1e-5)])
