@@ -410,6 +410,22 @@ def test_each_segment_of_a_path_has_its_own_limits_of_speed(which: str, slow: in
         assert each.move == (1 if begins else 0)
 
 
+@pytest.mark.parametrize("which", ["speed", "angular_speed"])
+@pytest.mark.parametrize(("share", "count"), [(1.0, 0), (1 - 2e-6, 1)])
+def test_a_tool_that_is_just_as_fast_as_a_segment_allows_passes(which: str, share: float, count: int) -> None:
+    """Its largest speed is that of a dense sampling of its twist, which the Jacobian makes of the joints' rates."""
+    path, curve = RIGHT.motion.path, RIGHT.trajectory.curve
+    assert path is not None
+    times = np.linspace(0.48, 0.52, 8001) * DURATION
+    twist = tcp_twist(RIGHT.robot, curve.evaluate(times), curve.evaluate(times, 1))
+    peak = np.linalg.norm(twist[:, :3] if which == "speed" else twist[:, 3:], axis=1).max()
+    allowed, free, borders = np.array([share * peak]), np.full(1, np.inf), np.array([0.0, path.length])
+    of_speed = (allowed, free) if which == "speed" else (free, allowed)
+    limited_path = dataclasses.replace(path, speeds=SpeedLimits(borders, (0, 1), *of_speed))
+    rows = dataclasses.replace(RIGHT, motion=dataclasses.replace(RIGHT.motion, path=limited_path))
+    assert len(list(_check_speeds(rows))) == count
+
+
 def test_a_branch_and_a_bound_have_the_times_of_the_whole():
     beside = shifted(RIGHT, 1e-3 * np.eye(6)[2])
     alone, after = ([each.time for each in check_tool(rows)] for rows in (beside, later(beside, 1.5)))
