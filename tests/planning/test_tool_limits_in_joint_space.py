@@ -96,13 +96,14 @@ def test_the_fastest_law_on_the_same_line_keeps_the_tool(planner: str) -> None:
             ({"speed": 250}, 3.91),
             ({"speed": 1000, "acceleration": 5000}, 1.24),
             ({"angular_speed": 60, "speed": 1000}, 1.69),
-            ({"jerk": 50_000}, 1.14),
+            ({"jerk": 50_000}, 0.918),
+            ({"speed": 700, "acceleration": 3000, "jerk": 20_000}, 1.74),
         ],
         2,
     ),
 )
 def test_a_swing_is_not_stretched_as_a_whole(tcp: dict[str, float], most: float) -> None:
-    """Stretched alike everywhere it took 1.641, 6.563, 1.641, 2.475 and 1.137 s.
+    """Stretched alike everywhere it took 1.641, 6.563, 1.641, 2.475, 1.137 and 2.344 s.
 
     No motion along the line is faster than its length at the largest speed of the tool.
     """
@@ -115,10 +116,32 @@ def test_a_swing_is_not_stretched_as_a_whole(tcp: dict[str, float], most: float)
     assert np.linalg.norm(steps, axis=1).sum() / (tcp.get("speed", 1e9) / 1000) <= duration <= most
     on_line = plan.trajectory.curve.evaluate(np.linspace(0, duration, 301)) - line[0]
     along = (on_line @ (line[-1] - line[0])) / np.square(line[-1] - line[0]).sum()
-    if "jerk" not in tcp:  # of the tool: it is stretched to that, each joint by its own law
-        np.testing.assert_allclose(on_line, along[:, None] * (line[-1] - line[0]), atol=1e-9)
+    np.testing.assert_allclose(on_line, along[:, None] * (line[-1] - line[0]), atol=1e-9)
     bounds = [event for event in plan.remarks if event.kind == "bound"]
     assert all("at most" in event.message for event in bounds)
+
+
+@pytest.mark.parametrize("planner", ["jerk_limited", "time_optimal"])
+@pytest.mark.parametrize("of_joint", [{}, {"jerk": 300}])
+def test_the_fastest_law_within_an_angular_jerk(planner: str, of_joint: dict[str, float]) -> None:
+    """w = qd: four ramps of one length, (32 L / J)^(1/3) s in all, with or without a limit of the joint."""
+    plan = planned({"planner": planner, "limits": of_joint}, {"angular_jerk": 6.0})
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == pytest.approx((32 * TURN / 6.0) ** (1 / 3), rel=3e-4)
+    (event,) = [event for event in plan.events if event.kind == "within_tool_limits"]
+    assert "to keep the angular jerk limit of the tool" in event.message
+
+
+@pytest.mark.parametrize("jerk", [1.0, 5.0])
+def test_a_jerk_of_the_tool_of_a_slide_is_that_of_its_joint(jerk: float) -> None:
+    slide = {"convention": "standard", "joints": [{"type": "prismatic"}]}
+    more = {"robot": slide, "moves": [{"planner": "jerk_limited", "to": {"joints": [1.3]}}]}
+    durations = []
+    for limits in ({"jerk": jerk}, {"tcp": {"jerk": jerk}}):
+        plan = plan_job(loaded(job({}, {}) | more | {"limits": {"velocity": 1, "acceleration": 2, **limits}}))
+        assert plan.verdict.passed
+        durations.append(plan.trajectory.duration)
+    assert durations[0] * (1 - 1e-9) <= durations[1] <= durations[0] * 1.001
 
 
 @pytest.mark.parametrize("tcp", [{"speed": 0.02}, {"angular_speed": 0.04}])

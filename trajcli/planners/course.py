@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.third_order.jerk import LawJerkConstraint
+from trajcli.curves.third_order.jerk import ThirdOrderConstraint
 from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
@@ -95,8 +95,8 @@ class Course(ABC):
         return None
 
     @property
-    def law_jerk(self) -> tuple[LawJerkConstraint, ...]:
-        """The limit of sddd by that of the jerk of the tool, where s is the length of its path."""
+    def jerk_constraints(self) -> tuple[ThirdOrderConstraint, ...]:
+        """The limits of the jerk of the tool along it, as far as laws keep them."""
         return ()
 
     @abstractmethod

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.third_order.jerk import ThirdOrderConstraint
 from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
@@ -12,7 +13,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.kinematics.tool_derivatives import tool_derivatives
 from trajcli.planners.course import Course, PassedPoints
-from trajcli.planners.tool_constraint import ToolConstraint
+from trajcli.planners.tool_constraint import ToolConstraint, ToolJerkConstraint
 
 
 @frozen
@@ -44,6 +45,11 @@ class ToolOfJoints:
         joined = found.reshape(len(s), 2, 6)
         return forward(self.robot, rows[:, 0]), joined[:, 0], joined[:, 1]
 
+    def derivatives(self, s: Array, side: Side = "right") -> Array:
+        """Return v by s, w by s and their first two derivatives at s (N,), shape (3, 2, N, 3)."""
+        rows = self.curve.evaluate_orders(s, (0, 1, 2, 3), side=side)
+        return tool_derivatives(self.robot, [rows[:, order] for order in range(4)]).transpose(1, 2, 0, 3)
+
 
 @frozen
 class JointCourse(Course):
@@ -72,7 +78,15 @@ class JointCourse(Course):
 
     def tool_constraint(self) -> PathConstraint:
         """Return the limits of the tool along it."""
-        return ToolConstraint(ToolOfJoints(self.curve, self.robot), self.robot.limits.tcp)
+        return ToolConstraint(ToolOfJoints(self.curve, self.robot), self.tcp, oblique=True)
+
+    @property
+    def jerk_constraints(self) -> tuple[ThirdOrderConstraint, ...]:
+        """The limits of the jerk of the tool."""
+        jerk = self.tcp.jerk, self.tcp.angular_jerk
+        if not np.isfinite(jerk).any():
+            return ()
+        return (ToolJerkConstraint(ToolOfJoints(self.curve, self.robot), jerk),)
 
     def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
         """Return nothing: its tool follows the joints."""

@@ -1,13 +1,15 @@
-"""Limits of the tool along a path, as rows of laws of second order."""
+"""Limits of the tool along a path, as rows of laws of second and of third order."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar, Protocol
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array, Side, derivative_coefficients, horner
+from trajcli.curves.third_order.jerk import JerkRows, LawState
 from trajcli.curves.time_optimal.constraints import ConstraintRows
 from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.frozen import frozen
@@ -16,6 +18,7 @@ from trajcli.kinematics.robot import ToolLimits
 
 _CORNERS = 16  # of the polygon inside the circle of accelerations
 _BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, its ends included
+_FLAT = 1e-6  # of the square of a vector: less beside another one has no direction
 _BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
 _EVEN = 1e-6  # of the square of the turning: an axis that changes by less stays
 
@@ -51,6 +54,19 @@ class KnownPoses(Protocol):
 
     def evaluate(self, s: Array, side: Side = "right") -> tuple[Array, Array, Array]:
         """Return X (N, 4, 4), X' and X'' (N, 6) at s (N,)."""
+        ...
+
+
+class TurningTool(Protocol):
+    """Velocities of a tool by s, with their derivatives."""
+
+    @property
+    def length(self) -> float:
+        """Last s."""
+        ...
+
+    def derivatives(self, s: Array, side: Side = "right") -> Array:
+        """Return v by s, w by s and their first two derivatives at s (N,), shape (3, 2, N, 3)."""
         ...
 
 
@@ -125,15 +141,12 @@ class ToolConstraint:
 
     def excess(self, law: LawPieces) -> Array:
         """Return the shares of speed and acceleration used at samples of each piece, shape (2, N)."""
-        times = np.linspace(0.0, 1.0, _BETWEEN)[:, None] * law.durations
-        s, sd, sdd = (horner(derivative_coefficients(law.coefficients, order), times) for order in range(3))
-        length = self.path.length
-        s = np.clip(np.maximum(np.minimum(s, s[-1] - _BESIDE * length), s[0]), 0.0, length).reshape(-1)
+        (s, sd, sdd), shape = _samples_of(law, self.path.length, 3)
         _, first, second = self.path.poses.evaluate(s, "right")
-        rate, change = sd.reshape(-1, 1), sdd.reshape(-1, 1)
+        rate, change = sd[:, None], sdd[:, None]
         acceleration = second * rate**2 + first * change
         used = _used(first * rate, acceleration, self._speeds(s, "right"), self.limits)
-        return np.asarray(used.reshape(2, _BETWEEN, -1).max(axis=1))
+        return np.asarray(used.reshape(2, *shape).max(axis=1))
 
     def _along(self, first: Array, second: Array) -> Array:
         """Return the part of p'' along p' at rows X' and X'' (N, 6), signed (N,); zero unless it counts."""
@@ -148,6 +161,75 @@ class ToolConstraint:
         if self.speeds is not None:
             return self.speeds.at(s, side)
         return np.full(s.size, self.limits.speed), np.full(s.size, self.limits.angular_speed)
+
+
+@frozen
+class ToolJerkConstraint:
+    """Limits of the jerk of the tool along a path, of its size in space.
+
+    Each is kept in the direction of the jerk of the law at hand, which is exact about it, and in those square
+    to it.
+
+    Attributes:
+        path: Of the tool.
+        jerk: The limits, m/s^3 and rad/s^3; infinite for none.
+    """
+
+    curved: ClassVar[bool] = True
+
+    path: TurningTool
+    jerk: tuple[float, float]
+
+    def rows(self, state: LawState, side: Side) -> JerkRows:
+        """Return the rows at p points of the path about a law there."""
+        s, v, a, u = state
+        orders = self.path.derivatives(np.clip(s, 0.0, self.path.length), side)
+        limited = [part for part, limit in enumerate(self.jerk) if math.isfinite(limit)]
+        rows = list[Array]()
+        for part in limited:
+            frame = _frame(_jerk(orders[:, part], (v, a, u)), orders[0, part])
+            rows.append(np.concatenate([frame, -frame], axis=1) @ orders[:, part, :, :, None])
+        first, second, third = np.concatenate(rows, axis=2)[..., 0]
+        limits = np.repeat([self.jerk[part] for part in limited], 6)
+        return JerkRows(first, second, third, np.broadcast_to(limits, first.shape))
+
+    def excess(self, law: LawPieces) -> Array:
+        """Return the largest share of the limits used at samples of each piece, shape (N,)."""
+        states, shape = _samples_of(law, self.path.length, 4)
+        orders = self.path.derivatives(states[0], "right")
+        sizes = [np.linalg.norm(_jerk(orders[:, part], states[1:]), axis=1) for part in (0, 1)]
+        used = np.divide(sizes, np.array(self.jerk)[:, None]).max(axis=0)
+        return np.asarray(used.reshape(shape).max(axis=0))
+
+
+def _jerk(orders: Array, rates: Sequence[Array]) -> Array:
+    """Return the jerk (p, 3) of a point with derivatives (3, p, 3) by s, under sd, sdd and sddd (p,)."""
+    v, a, u = (rate[:, None] for rate in rates)
+    return np.asarray(orders[0] * u + 3.0 * orders[1] * (v * a) + orders[2] * v**3)
+
+
+def _frame(first: Array, second: Array) -> Array:
+    """Return three unit vectors (p, 3, 3) square to each other, the first along (p, 3), by another one."""
+    along = _unit(first, _unit(second, np.eye(3)[:1]))
+    across = second - along * (along * second).sum(axis=1, keepdims=True)
+    far = (across**2).sum(axis=1, keepdims=True) > _FLAT * (second**2).sum(axis=1, keepdims=True)
+    across = np.where(far, across, np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)]))
+    beside = _unit(across, across)
+    return np.stack([along, beside, np.cross(along, beside)], axis=1)
+
+
+def _unit(vectors: Array, otherwise: Array) -> Array:
+    """Return vectors (p, 3) of size 1; others where they are zero."""
+    sizes = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(sizes > 0, vectors / np.where(sizes > 0, sizes, 1.0), otherwise)
+
+
+def _samples_of(law: LawPieces, length: float, count: int) -> tuple[list[Array], tuple[int, int]]:
+    """Return s and its derivatives, `count` in all, each (m N,), at m times of N pieces; and (m, N)."""
+    times = np.linspace(0.0, 1.0, _BETWEEN)[:, None] * law.durations
+    s, *rates = (horner(derivative_coefficients(law.coefficients, order), times) for order in range(count))
+    s = np.clip(np.maximum(np.minimum(s, s[-1] - _BESIDE * length), s[0]), 0.0, length)
+    return [each.reshape(-1) for each in (s, *rates)], s.shape
 
 
 def _used(velocity: Array, acceleration: Array, speeds: tuple[Array, Array], limits: ToolLimits) -> Array:

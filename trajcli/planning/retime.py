@@ -4,20 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, copysign
+from math import ceil, copysign, inf
 
 from trajcli.checks.verify import over_limits
 from trajcli.curves.operations import scale_time
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import Robot
-from trajcli.limits.kinds import KIND_OF, LIMITS_OF_JOINTS, LimitedMove, has_further_limits
+from trajcli.limits.kinds import (
+    KIND_OF,
+    LIMITS_OF_JOINTS,
+    TOOL_KINDS,
+    LimitedMove,
+    LimitKind,
+    has_further_limits,
+)
 from trajcli.planners.planner import LITTLE, Event, Planned, PlannedMove, Planner
 from trajcli.trajectory import State
 from trajcli.units import effort_unit
 
 LONGEST = 1e4
 """Times the planned duration: a move that needs more is not over its limit, it is wrong."""
+_STEPS_OF_TOOL = {
+    f"{kind.name}_jump": KIND_OF[kind.name.replace("acceleration", "jerk")]
+    for kind in TOOL_KINDS
+    if kind.order == 2
+}
+"""Limits that steps of the accelerations of the tool break, by the kinds of these findings."""
 _ONE_BY_ONE = 1  # factors tried at once: each costs a plan of its own
 _WHOLE = 1e-9  # of a period: what is this close to whole is whole
 _TRIES = 50
@@ -65,8 +78,12 @@ def keep_further_limits(move: PlannedMove) -> PlannedMove:
     finds = move.planner.finds_duration and move.planner.without_duration() is None and move.duration > 0
     if not (finds and has_further_limits(move.robot.limits)):
         return move
+    found = _findings(move)
+    steps = [finding for finding in found if finding.kind in _STEPS_OF_TOOL]
+    if steps:  # no stretch helps
+        return _within_tool_limits(move, steps, inf) or move
     left = {"never", "on paths"} if move.planned.tool is None else {"never"}
-    over = [f for f in over_limit(move) if f.kind in KIND_OF and KIND_OF[f.kind].planned in left]
+    over = [f for f in _slowed(found) if f.kind in KIND_OF and KIND_OF[f.kind].planned in left]
     factor = smallest_stretch(move, over) if over else None
     if factor is None or isinstance(factor, Problem):
         return move
@@ -87,7 +104,7 @@ def _within_tool_limits(move: PlannedMove, over: Sequence[Finding], stretched: f
 
     None where that is no faster than the move stretched, which lasts `stretched` seconds.
     """
-    if not any(KIND_OF[finding.kind].of_tool for finding in over):
+    if not any(_limit_of(finding).of_tool for finding in over):
         return None
     try:
         planned = move.planner.within_tool_limits(move.start, move.robot)
@@ -96,7 +113,9 @@ def _within_tool_limits(move: PlannedMove, over: Sequence[Finding], stretched: f
     if planned is None:
         return None
     other = replace(move, planned=planned)
-    left = [finding.factor or LONGEST for finding in over_limit(other)]
+    found = _findings(other)
+    left = [finding.factor or LONGEST for finding in _slowed(found)]
+    left += [inf for finding in found if finding.kind in _STEPS_OF_TOOL]
     least = getattr(move.planner, "minimum_duration", None) or 0.0
     duration = max(other.duration * max([1.0, *left]), least)
     if duration >= stretched:
@@ -195,7 +214,7 @@ def _event(
     kind: str, how: str, move: PlannedMove, slower: PlannedMove, over: Sequence[Finding], remark: str = ""
 ) -> Event:
     worst = max(over, key=lambda finding: finding.factor or 0.0)
-    limit = KIND_OF[worst.kind].words
+    limit = _limit_of(worst).words
     message = f"{how}, from {{before}} to {{after}}, to keep the {limit} limit of {{whose}}{remark}"
     amounts: Amounts = {
         "before": Amount(move.duration),
@@ -207,8 +226,20 @@ def _event(
 
 def over_limit(move: PlannedMove) -> list[Finding]:
     """Return the findings about a move alone that a longer duration may help against, and about positions."""
-    findings = over_limits(move.alone(), [move.robot.limits], [move.promise])
+    return _slowed(_findings(move))
+
+
+def _findings(move: PlannedMove) -> tuple[Finding, ...]:
+    return over_limits(move.alone(), [move.robot.limits], [move.promise])
+
+
+def _slowed(findings: Sequence[Finding]) -> list[Finding]:
     return [f for f in findings if f.kind in LIMITS_OF_JOINTS or f.factor is not None]
+
+
+def _limit_of(finding: Finding) -> LimitKind:
+    """Return the limit that a finding is about."""
+    return _STEPS_OF_TOOL.get(finding.kind) or KIND_OF[finding.kind]
 
 
 def require_holdable(move: PlannedMove) -> None:

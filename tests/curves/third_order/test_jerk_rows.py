@@ -45,11 +45,16 @@ def jerk_at(path, law, piece, times):
     return np.array(values).T
 
 
+def about(s):
+    """Return a law at rest at s (p,): the rows of these limits are the same about every law."""
+    return (np.array(s), *np.zeros((3, len(s))))
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_rows_are_the_third_derivative_by_the_chain_rule(side):
     """s(t) = s + v t + a t^2 / 2 + u t^3 / 6: the jerk of q(s(t)) at t = 0, for both bounds of each joint."""
     path, s, (v, a, u) = path_of(1), np.array([0.1, 1 / 3, 0.7]), (0.8, -0.5, 1.3)
-    rows = JointJerkConstraint(path, JERK).rows(s, side)
+    rows = JointJerkConstraint(path, JERK).rows(about(s), side)
     found = rows.first * u + 3 * rows.second * v * a + rows.third * v**3
     assert found.shape == rows.limit.shape == (3, 4)
     for k, at in enumerate(s):
@@ -81,7 +86,7 @@ def test_the_excess_of_a_law_is_its_own_third_derivative(sign):
     law = LawPieces(np.array([0.7, 1.3]), columns)
     ends = np.abs([6 * columns[1], 24 * columns[0] * law.durations + 6 * columns[1]]).max(axis=0)
     np.testing.assert_allclose(LawJerkConstraint(4.0).excess(law), ends / 4.0)
-    rows = LawJerkConstraint(4.0).rows(np.array([0.1, 0.5, 0.9]), "left")
+    rows = LawJerkConstraint(4.0).rows(about([0.1, 0.5, 0.9]), "left")
     np.testing.assert_array_equal(rows.first, np.tile([1.0, -1.0], (3, 1)))
     assert rows.second.shape == rows.third.shape == rows.limit.shape == (3, 2)
     assert not np.concatenate([rows.second, rows.third]).any()

@@ -120,8 +120,8 @@ def _second_order(
 
 def _third_order(sample: Sample, constraint: ThirdOrderConstraint, lowered: Array) -> tuple[Array, Array]:
     """Return the rows of jerk, with what b = 1 leaves of the tangents."""
-    s, v, a, u = sample.state
-    given = constraint.rows(s, sample.side)
+    _, v, a, u = sample.state
+    given = constraint.rows(sample.state, sample.side)
     limit = (given.limit / lowered[:, None]).T
     first, second, third = given.first.T / limit, given.second.T / limit, given.third.T / limit
     by_bend, by_slope = 0.5 * first * v, 1.5 * (first * a + second * v**2)

@@ -6,7 +6,7 @@ constraints (ICRA 2017), for the form; Debrouwere et al. (2013) for b = sd^2.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from trajcli.frozen import frozen
 
 _KINK = 1e-6  # of the largest q'' of a joint: a jump above it is one
 _ROUNDING = 1e-9  # of the largest q'' of all joints, or q' over a piece: the same, where one hardly bends
+
+LawState = tuple[Array, Array, Array, Array]
+"""s, sd, sdd and sddd of a law at p points, each (p,)."""
 
 
 @frozen
@@ -38,8 +41,13 @@ class JerkRows:
 class ThirdOrderConstraint(Protocol):
     """What limits the third derivative of a motion along a path."""
 
-    def rows(self, s: Array, side: Side) -> JerkRows:
-        """Return the rows at the points (p,) of the path, seen from one side; k is always the same."""
+    @property
+    def curved(self) -> bool:
+        """Whether a jump of q'' of any joint passes it, so that the motion must stop there."""
+        ...
+
+    def rows(self, state: LawState, side: Side) -> JerkRows:
+        """Return the rows at p points of the path, seen from one side, about a law; k is always the same."""
         ...
 
     def excess(self, law: LawPieces) -> Array:
@@ -55,13 +63,16 @@ class LawJerkConstraint:
         limit: Of its size, positive.
     """
 
+    curved: ClassVar[bool] = False
+
     limit: float
 
-    def rows(self, s: Array, side: Side) -> JerkRows:
-        """Return the rows of both signs at the points (p,) of the path."""
+    def rows(self, state: LawState, side: Side) -> JerkRows:
+        """Return the rows of both signs at p points of the path."""
         del side
-        signs, nothing = np.tile([1.0, -1.0], (s.size, 1)), np.zeros((s.size, 2))
-        return JerkRows(signs, nothing, nothing, np.full((s.size, 2), self.limit))
+        points = state[0].size
+        signs, nothing = np.tile([1.0, -1.0], (points, 1)), np.zeros((points, 2))
+        return JerkRows(signs, nothing, nothing, np.full((points, 2), self.limit))
 
     def excess(self, law: LawPieces) -> Array:
         """Return what is used of the limit in each piece, shape (N,)."""
@@ -78,6 +89,8 @@ class JointJerkConstraint:
         jerk: Lower and upper bounds, shape (n, 2), lower < 0 < upper, infinite for none.
     """
 
+    curved: ClassVar[bool] = False  # some joints have no limit
+
     path: PiecewisePolynomial
     jerk: Array
 
@@ -87,11 +100,11 @@ class JointJerkConstraint:
         if not ((self.jerk[:, 0] < 0) & (self.jerk[:, 1] > 0)).all():
             raise ValueError("jerk bounds must be pairs with lower < 0 < upper")
 
-    def rows(self, s: Array, side: Side) -> JerkRows:
-        """Return the rows at points (p,), one for each finite bound."""
+    def rows(self, state: LawState, side: Side) -> JerkRows:
+        """Return the rows at p points of the path, one for each finite bound."""
         upper, lower = np.isfinite(self.jerk[:, 1]), np.isfinite(self.jerk[:, 0])
         limits = np.concatenate([self.jerk[upper, 1], -self.jerk[lower, 0]])
-        derivatives = self.path.evaluate_orders(s, (1, 2, 3), side=side).transpose(1, 0, 2)
+        derivatives = self.path.evaluate_orders(state[0], (1, 2, 3), side=side).transpose(1, 0, 2)
         both = (np.concatenate([each[:, upper], -each[:, lower]], axis=1) for each in derivatives)
         first, second, third = both
         return JerkRows(first, second, third, np.broadcast_to(limits, first.shape))

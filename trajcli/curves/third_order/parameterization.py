@@ -108,7 +108,8 @@ def jerk_limited_time_optimal(
     bounds = [np.asarray(each, dtype=np.float64) for each in (velocity, acceleration, jerk)]
     ends = EndStates(start, end)
     speeds = {"start_velocity": start[0], "end_velocity": end[0]}
-    stops = curvature_jumps(path, bounds[2])
+    curved = any(constraint.curved for constraint in further_jerk)
+    stops = curvature_jumps(path, np.zeros_like(bounds[2]) if curved else bounds[2])
     second = time_optimal(path, bounds[0], bounds[1], **speeds, further=further, stops=stops, along=along)
     limits = LawLimits(
         (JointConstraint(path, bounds[0], bounds[1]), *further),

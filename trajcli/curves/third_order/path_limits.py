@@ -52,7 +52,7 @@ class LawLimits:
                 parts.append(np.where(v > 0, v**2 / given.cap, 0.0))
             rows.append((given.a.T * a + given.b.T * v**2) / given.c.T)
         for jerk in self.third:
-            turn = jerk.rows(s, sample.side)
+            turn = jerk.rows(sample.state, sample.side)
             value = turn.first.T * u + 3.0 * turn.second.T * (v * a) + turn.third.T * v**3
             parts.append((value / turn.limit.T).max(axis=0, initial=0.0))
         shares = np.concatenate(rows)

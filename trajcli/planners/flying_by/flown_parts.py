@@ -160,7 +160,7 @@ def along_path(course: Course, stretch: tuple[float, float], states: Array, temp
     (v0, a0), (v1, a1) = (states / [tempo, tempo**2]).tolist()
     further, bounds = course.constraints(path), (limits.velocity, limits.acceleration)
     moving = np.abs(path.piece_ends(1)).max(axis=(0, 1)) > 0
-    if course.law_jerk or np.isfinite(limits.jerk[moving]).any():
+    if course.jerk_constraints or np.isfinite(limits.jerk[moving]).any():
         ends = {"start": (v0, a0), "end": (v1, a1)}
         solved: TimeOptimalMotion = jerk_limited_time_optimal(
             path,
@@ -168,7 +168,7 @@ def along_path(course: Course, stretch: tuple[float, float], states: Array, temp
             limits.jerk,
             **ends,
             further=further,
-            further_jerk=course.law_jerk,
+            further_jerk=course.jerk_constraints,
             hopeless=_HOPELESS,
             slower=_SLOWER,
         )

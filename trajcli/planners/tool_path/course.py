@@ -70,7 +70,7 @@ class ToolCourse(Course):
         return speed, change, change if self.law.deceleration is None else min(change, self.law.deceleration)
 
     @property
-    def law_jerk(self) -> tuple[LawJerkConstraint, ...]:
+    def jerk_constraints(self) -> tuple[LawJerkConstraint, ...]:
         """The limit of sddd by that of the jerk of the tool; none where it turns in its place."""
         return jerk_of_law(self.tcp, angular=self.joints.path.poses.pure_rotation)
 

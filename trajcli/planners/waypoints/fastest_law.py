@@ -10,6 +10,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.third_order.end_curvature import with_end_curvature
+from trajcli.curves.third_order.jerk import ThirdOrderConstraint
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
 from trajcli.curves.third_order.quartic_law import ReversingLawError
 from trajcli.curves.time_optimal.constraints import PathConstraint
@@ -68,7 +69,8 @@ def solve_within_jerk(
     if not (bends and path.speeds[0]):
         _require_along(across, acceleration, robot)
     limits = robot.limits
-    curve, speeds, further = path.curve, path.speeds, _further(path.curve, robot, of_tool=of_tool)
+    curve, speeds = path.curve, path.speeds
+    further, of_jerk = _further(curve, robot, of_tool=of_tool)
 
     def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return jerk_limited_time_optimal(
@@ -79,6 +81,7 @@ def solve_within_jerk(
             start=(speeds[0], along),
             end=(speeds[1], 0.0),
             further=(*further, *efforts),
+            further_jerk=of_jerk,
         )
 
     with _ends_refused():
@@ -102,13 +105,16 @@ def _ends_refused() -> Iterator[None]:
         raise PlanningError(message, hint="lower them a little") from None
 
 
-def _further(curve: PiecewisePolynomial, robot: Robot, *, of_tool: bool) -> tuple[PathConstraint, ...]:
-    """Return what limits laws along a path besides the rates of joints."""
+def _further(
+    curve: PiecewisePolynomial, robot: Robot, *, of_tool: bool
+) -> tuple[tuple[PathConstraint, ...], tuple[ThirdOrderConstraint, ...]]:
+    """Return what limits laws along a path besides the rates of joints, and what limits their jerk."""
     if not of_tool:
-        return path_constraints(curve, robot)
+        return path_constraints(curve, robot), ()
     from trajcli.planners.joint_course import JointCourse
 
-    return JointCourse(curve, robot).constraints(curve)
+    course = JointCourse(curve, robot)
+    return course.constraints(curve), course.jerk_constraints
 
 
 def solve_second_order(path: JointPath, robot: Robot, *, of_tool: bool) -> TimeOptimalMotion:
@@ -123,7 +129,7 @@ def solve_second_order(path: JointPath, robot: Robot, *, of_tool: bool) -> TimeO
         PlanningError: When the velocities at the ends are too high.
     """
     limits = robot.limits
-    further = _further(path.curve, robot, of_tool=of_tool)
+    further, _ = _further(path.curve, robot, of_tool=of_tool)
 
     def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
         return time_optimal(

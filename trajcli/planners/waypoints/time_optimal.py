@@ -214,7 +214,7 @@ class TimeOptimal(ThroughPoints):
         return self._along_path(start, robot, of_tool=True)
 
     def _along_path(self, start: State, robot: Robot, *, of_tool: bool) -> Planned:
-        if not self._keeps_jerk(robot):  # its acceleration steps anyway
+        if not self._keeps_jerk(robot, of_tool=of_tool):  # its acceleration steps anyway
             start = State(start.position, start.velocity, np.zeros_like(start.acceleration))
         points = self._untimed().waypoints(start, robot)
         moving = np.ptp(points.positions, axis=0) > 0
@@ -249,13 +249,17 @@ class TimeOptimal(ThroughPoints):
             continuity=1 if jerk is None else 2,
         )
 
-    def _keeps_jerk(self, robot: Robot) -> bool:
-        return self.jerk == "keep" and bool(np.isfinite(robot.limits.jerk).any())
+    def _keeps_jerk(self, robot: Robot, moving: NDArray[np.bool_] | None = None, *, of_tool: bool) -> bool:
+        """Return whether limits of jerk are kept: of joints, all or those that move (n,), or of the tool."""
+        limits = robot.limits
+        joints = limits.jerk if moving is None else limits.jerk[moving]
+        tool = (limits.tcp.jerk, limits.tcp.angular_jerk) if of_tool else ()
+        return self.jerk == "keep" and bool(np.isfinite([*joints.flat, *tool]).any())
 
     def _solved(
         self, points: PointTable, robot: Robot, moving: NDArray[np.bool_], *, of_tool: bool
     ) -> tuple[JointPath, TimeOptimalMotion]:
-        if not self._keeps_jerk(robot) or not np.isfinite(robot.limits.jerk[moving]).any():
+        if not self._keeps_jerk(robot, moving, of_tool=of_tool):
             path = self._path(points, robot, smooth=False)
             return path, solve_second_order(path, robot, of_tool=of_tool)
         if self.path == "spline":
