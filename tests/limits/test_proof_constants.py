@@ -15,6 +15,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from trajcli.job.robot import load_robot
+from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.limits import tool_bound
 from trajcli.limits.tool_bound import tool_bounds
 
@@ -71,6 +72,19 @@ def test_a_peak_that_no_row_shows_is_within_the_bound(quantity, name, order, siz
     # is the same everywhere
     remainder = size * abs(shown[0]) * factorial(8) / 4 / 8**9
     assert found.upper_bound - size == pytest.approx(remainder, rel=1e-5)
+
+
+def test_a_peak_that_no_row_shows_counts_by_how_far_a_slide_stands_out():
+    """A tool on a slide that stands 5 m out goes 5 m around the first joint for each radian of it."""
+    joints = Joint("turn", alpha=np.pi / 2), Joint("slide", "prismatic")
+    robot = Robot("polar", joints, unlimited(2), "standard", np.eye(4), np.eye(4))
+    shown, peak = hidden_peak()
+    turn = np.polyint(shown)
+    coefficients = np.zeros((turn.size, 1, 2))
+    coefficients[:, 0, 0], coefficients[-1, 0, 1] = turn, 5.0
+    speed = tool_bounds(robot, np.array([0.0, 1.0]), coefficients)[SPEED]
+    assert speed.value == pytest.approx(5.0)
+    assert speed.upper_bound - 5.0 >= 5.0 * (peak - 1.0) * (1 - 1e-6)
 
 
 @pytest.mark.parametrize("size", [1e-3, 2e-3])
