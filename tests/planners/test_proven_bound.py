@@ -31,6 +31,8 @@ UNEQUAL = {
     "jerk": [[-60.0, 40.0], [-50.0, 80.0]],
 }
 """Limits that differ by direction, of either joint otherwise."""
+SLOW = {"velocity": 3 / 8, "acceleration": 8 / 8**2, "jerk": 60 / 8**3}
+"""Those of the other motions in eight times the time: rates of higher orders are smaller numbers."""
 INTERVALS, FINE = 3, 16  # of a part; fine steps of each interval, which meet the switches at quarters
 
 
@@ -140,13 +142,13 @@ def states_of(chain: FlownChain, programme: ShareProgramme) -> tuple[np.ndarray,
     return found, durations / durations.sum()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(9))
 def test_a_motion_obeys_every_row_in_every_box_around_it(seed: int) -> None:
     """Secants, products and orders: a motion that exists is in no box refuted."""
     rng = np.random.default_rng(seed)
     fast = [2.1, 1.2], [2.1, 2.9]  # joints that reach their velocity
-    limits = {} if seed % 4 < 2 else {"limits": UNEQUAL}
-    plan = planned(*fast, **limits) if seed % 2 else planned([0.9, 0.8], [0.2, 1.5], zone=0.05, **limits)
+    limits = {"limits": SLOW} if seed > 7 else {} if seed % 4 < 2 else {"limits": UNEQUAL}
+    plan = planned(*fast, **limits) if seed % 2 or seed > 7 else planned([0.9, 0.8], [0.2, 1.5], zone=0.05, **limits)
     chain = chain_of_plan(plan)
     programme = ShareProgramme(chain.chain, 5, 4)
     found, shares = states_of(chain, programme)
