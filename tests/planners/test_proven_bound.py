@@ -148,7 +148,11 @@ def test_a_motion_obeys_every_row_in_every_box_around_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     fast = [2.1, 1.2], [2.1, 2.9]  # joints that reach their velocity
     limits = {"limits": SLOW} if seed > 7 else {} if seed % 4 < 2 else {"limits": UNEQUAL}
-    plan = planned(*fast, **limits) if seed % 2 or seed > 7 else planned([0.9, 0.8], [0.2, 1.5], zone=0.05, **limits)
+    plan = (
+        planned(*fast, **limits)
+        if seed % 2 or seed > 7
+        else planned([0.9, 0.8], [0.2, 1.5], zone=0.05, **limits)
+    )
     chain = chain_of_plan(plan)
     programme = ShareProgramme(chain.chain, 5, 4)
     found, shares = states_of(chain, programme)
