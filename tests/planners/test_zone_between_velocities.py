@@ -91,7 +91,20 @@ def test_the_slowest_joint_counts_and_what_takes_longer_than_asked_for_is_that()
     assert lasting([2000.0], (0.0, 0.0), (0.0, 0.0), False) == 50.0
 
 
-def test_a_zone_has_the_slopes_of_both_of_its_lines() -> None:
+@pytest.mark.parametrize("standing", [0, 1])
+@pytest.mark.parametrize("speeds", SPEEDS)
+def test_a_joint_that_stands_beside_another_one_asks_for_nothing(
+    speeds: tuple[float, float], standing: int
+) -> None:
+    """Of short ways, either way round, the change of the other one's velocity takes the time."""
+    for step in (0.01, -0.01):
+        steps, before, behind = (np.insert([own], standing, 0.0) for own in (step, *speeds))
+        limits = np.array([[LOW, HIGH]] * 2), np.array([[-BRAKE, GAIN]] * 2)
+        found = ZonePassage(steps, before, behind, *limits).durations(np.ones((1, 2)), np.ones((1, 2)), 50.0)
+        assert found[0, 0] == pytest.approx(fastest(step, *speeds, (LOW, HIGH, BRAKE, GAIN)), rel=1e-6)
+
+
+def test_a_zone_has_the_slopes_of_both_of_its_lines_and_the_limits_of_the_job() -> None:
     """Straight lines of s from 0 to 1: what joints go per s is the difference of their ends."""
     chains = job_of(*TARGETS[:2]).flyby
     assert chains is not None
@@ -101,3 +114,5 @@ def test_a_zone_has_the_slopes_of_both_of_its_lines() -> None:
     start, *targets = np.array([[0.3, 1.2], *TARGETS[:2]])
     np.testing.assert_allclose(passage.before, targets[0] - start, rtol=1e-12)
     np.testing.assert_allclose(passage.behind, targets[1] - targets[0], rtol=1e-12)
+    np.testing.assert_allclose(passage.velocity, [[-3.0, 3.0]] * 2)
+    np.testing.assert_allclose(passage.acceleration, [[-8.0, 8.0]] * 2)
