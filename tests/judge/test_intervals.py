@@ -107,7 +107,11 @@ def test_the_rows_of_a_piece_have_the_larger_rounding_of_both_of_its_joint(joint
 @pytest.mark.parametrize(("changed", "at"), [(0.0, 0), (0.5, 0), (0.999, 0), (1.0, 1)])
 def test_a_time_is_at_the_row_before_it_or_at_its_own(changed: float, at: int) -> None:
     window = window_of(5)
-    assert window.row_at(2, changed * window.lengths[2]) == 12 + at
+    fields = {name: getattr(window, name) for name in window.__dataclass_fields__}
+    nothing, after = np.zeros((1, 2, ROWS - 1, JOINTS)), window.moves[:-1]
+    pairs = JoinedPairs(**fields, stated=nothing, moves_after=after, begun=window.t[:-1])
+    for each in (window, pairs):
+        assert each.row_at(2, changed * window.lengths[2]) == 12 + at
 
 
 @pytest.mark.parametrize("side", [1, -1])

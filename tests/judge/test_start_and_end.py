@@ -165,6 +165,8 @@ def test_stamps_are_later_than_those_of_the_block_before(row: int, stamp: float)
     )
     (found,) = [each for each in judged(rows, end=False, blocks=300).findings if each.rule == "time"]
     assert (found.row, found.count, found.severity, found.certainty) == (row + 1, 1, "error", "exceeded")
+    stamps = (stamp, stamp, t[row - 1]) if np.isfinite(stamp) else (None, None, None)
+    assert (found.value, found.time, found.limit) == stamps
 
 
 @pytest.mark.parametrize("name", ["q", "qd"])
