@@ -162,3 +162,25 @@ def test_friction_at_rest_is_that_of_the_motion_before(last: float, side: int, t
     assert (effort.severity, effort.certainty, found.verdict) == ("warning", "exceeded", "satisfied")
     assert -3.3 * 1.6 + 1 < side * effort.value < -2.5
     assert effort.time < 0.06
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("deceleration", "verdict"), [(5.0, "exceeded"), (4.0, "satisfied")])
+def test_a_joint_that_turns_slowly_has_the_friction_of_its_way_back(
+    deceleration: float, verdict: str, side: int, tmp_path: Path
+) -> None:
+    """I = 0.33 kg m^2 with 1 N m of friction: back, at 0.4 rad/s at most, it takes 1.65 + 1 or 1.32 + 1 of 2.5 N m."""
+    (tmp_path / "arm.yaml").write_text(
+        "name: arm\nconvention: standard\njoints:\n  - {a: 1, effort: 2.5, friction: {coulomb: 1}, "
+        "link: {mass: 1, com: [-0.5, 0, 0], inertia: [0.08, 0.08, 0.08, 0, 0, 0]}}\n"
+    )
+    t = np.array([0.0, 1.0 / deceleration])  # from 0.6 to -0.4 rad/s
+    rows = np.column_stack(
+        [t, 0.6 * t - 0.5 * deceleration * t**2, 0.6 - deceleration * t, [-deceleration] * 2]
+    )
+    rows[:, 1:] *= side
+    np.savetxt(tmp_path / "rows.csv", rows, "%.16e", ",", header="t,q1,qd1,qdd1", comments="")
+    found = check_file(str(tmp_path / "rows.csv"), CheckOptions(robot=str(tmp_path / "arm.yaml"))).judgement
+    efforts = [each for each in found.findings if each.kind == "effort"]
+    assert found.verdict == verdict
+    assert [side * each.value for each in efforts] == pytest.approx([-2.65] if efforts else [], rel=1e-5)
