@@ -83,6 +83,15 @@ def test_what_rounding_explains_is_nothing_where_a_consumer_joins_them_either() 
     assert as_joined(Judgement((explained,), "cubic", 2)).verdict == "satisfied"
 
 
+@pytest.mark.parametrize("rule", ["continuity", "derivative", "time", "state", "franka-jerk"])
+@pytest.mark.parametrize("value", [0.5, 1 + 1e-9, 2.0])
+def test_of_joined_rows_everything_but_limits_is_judged_as_of_any_others(rule: str, value: float) -> None:
+    """Whatever number stands beside which, as of a distance that is too short, and whatever rounding explains."""
+    for certainty in ("exceeded", "within rounding"):
+        judgement = Judgement((finding(value, rule=rule, certainty=certainty),), "cubic", 2)
+        assert as_joined(judgement).findings == judgement.findings
+
+
 def test_the_worst_of_what_is_passed_is_named() -> None:
     tool = finding(3.0, rule="limit", kind="tool_speed", joint=None)
     (event,) = planned(finding(rule="limit"), tool).events

@@ -95,6 +95,21 @@ def test_what_the_columns_do_not_allow_is_refused() -> None:
         chosen_interpolation("spline", True, True)
 
 
+@pytest.mark.parametrize(
+    ("asked", "velocities", "instead"),
+    [("cubic", False, "linear"), ("quintic", True, "cubic"), ("quintic", False, "linear")],
+)
+def test_advice_on_what_the_columns_allow_can_be_followed(asked: str, velocities: bool, instead: str) -> None:
+    with pytest.raises(InputError) as refused:
+        chosen_interpolation(asked, velocities, False)
+    assert f"say --interpolate {instead}, or leave it out" in str(refused.value.problems[0].hint)
+    assert (
+        chosen_interpolation(instead, velocities, False)
+        == instead
+        == chosen_interpolation(None, velocities, False)
+    )
+
+
 def test_a_row_states_what_all_its_joints_state_one_after_the_other() -> None:
     """A velocity of one joint alone is none of the row, and an acceleration without a velocity does not count."""
     q, none = np.zeros((6, 2)), np.nan

@@ -169,6 +169,23 @@ def test_stamps_are_later_than_those_of_the_block_before(row: int, stamp: float)
     assert (found.value, found.time, found.limit) == stamps
 
 
+@pytest.mark.parametrize("blocks", [100, 256, 300])
+@pytest.mark.parametrize("late", [2, 7])
+def test_a_clock_that_stands_at_first_hides_nothing_behind_it(late: int, blocks: int) -> None:
+    """256 rows with one stamp, of which the first one counts, then one that goes 5 rad/s between two of twenty."""
+    t = np.append(np.zeros(256), 0.01 * np.arange(1, 21))
+    q = np.where(np.arange(276) < 256 + late, 0.0, 0.05)[:, None]
+    exact = np.zeros(1)
+    rows = RecordedMotion(
+        t, q, None, None, None, None, None, None, Resolution(0.0, exact, exact, exact), "rows"
+    )
+    robot = bare_robot(replace(unlimited(1), velocity=np.array([[-1.0, 1.0]])))
+    parts = [part(rows, slice(low, low + blocks)) for low in range(0, 276, blocks)]
+    found = {each.kind: each for each in judge_motion(lambda: parts, Requirements(robot)).findings}
+    assert (found["time"].count, found["velocity"].count) == (255, 1)
+    assert found["velocity"].value == pytest.approx(5.0)
+
+
 @pytest.mark.parametrize("name", ["q", "qd"])
 @pytest.mark.parametrize("row", [0, -1])
 def test_rounding_by_a_share_of_each_number_explains_what_it_may(row: int, name: str) -> None:
