@@ -46,24 +46,26 @@ def on_circle(v: np.ndarray, a: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, 
 
 
 @pytest.mark.parametrize("limits", [(2.0, inf), (inf, 3.0), (2.0, 3.0)])
-def test_the_nearest_row_is_the_size_of_the_jerk_and_all_of_them_bound_it(
+def test_the_nearest_row_is_the_size_of_the_jerk_and_p_is_in_their_plane(
     limits: tuple[float, float],
 ) -> None:
     rows = ToolJerkConstraint(one_link(), limits).rows(STATE, "right")
     sizes = [size / limit for size, limit in zip(on_circle(*STATE[1:]), limits, strict=True) if limit < inf]
-    shares = used(rows, STATE).reshape(4, len(sizes), 6)
+    shares = used(rows, STATE).reshape(4, len(sizes), 18)
     np.testing.assert_allclose(shares.max(axis=2), np.transpose(sizes), atol=1e-12)
-    np.testing.assert_allclose((shares**2).sum(axis=2), 2 * np.square(sizes).T, atol=1e-12)  # both signs
-    boxes = np.square(rows.first / rows.limit).reshape(4, len(sizes), 6).sum(axis=2)
+    np.testing.assert_allclose(shares.min(axis=2), -np.transpose(sizes), atol=1e-12)
+    around = np.square(rows.first / rows.limit).reshape(4, len(sizes), 18)[..., :16].sum(axis=2)
     tangents = [size / limit for size, limit in zip((LEVER * TURN, TURN), limits, strict=True) if limit < inf]
-    np.testing.assert_allclose(boxes, np.tile(2 * np.square(tangents), (4, 1)), rtol=1e-12)
+    np.testing.assert_allclose(
+        around, np.tile(8 * np.square(tangents), (4, 1)), rtol=1e-12
+    )  # 16 of mean cos^2
 
 
 def test_a_tool_on_the_axis_has_angular_jerk_alone() -> None:
     rows = ToolJerkConstraint(one_link(0.0), (2.0, 3.0)).rows(STATE, "right")
     shares = used(rows, STATE)
-    assert not shares[:, :6].any()
-    np.testing.assert_allclose(shares[:, 6:].max(axis=1), np.abs(TURN * STATE[3]) / 3.0, atol=1e-12)
+    assert not shares[:, :18].any()
+    np.testing.assert_allclose(shares[:, 18:].max(axis=1), np.abs(TURN * STATE[3]) / 3.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("limits", [(2.0, inf), (inf, 3.0), (2.0, 3.0), (9.0, 0.1)])

@@ -18,6 +18,10 @@ from trajcli.kinematics.robot import ToolLimits
 
 _CORNERS = 16  # of the polygon inside the circle of accelerations
 _BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, its ends included
+_TURNS = np.arange(16) * math.pi / 8
+_AROUND = np.concatenate(  # directions of a frame in which a vector is bounded: a polygon, and square to it
+    [np.stack([np.cos(_TURNS), np.sin(_TURNS), np.zeros(16)], axis=1), [[0, 0, 1], [0, 0, -1]]]
+)
 _FLAT = 1e-6  # of the square of a vector: less beside another one has no direction
 _BESIDE = 1e-13  # of the length: so far before its end the last sample of an interval is
 _EVEN = 1e-6  # of the square of the turning: an axis that changes by less stays
@@ -167,8 +171,8 @@ class ToolConstraint:
 class ToolJerkConstraint:
     """Limits of the jerk of the tool along a path, of its size in space.
 
-    Each is kept in the direction of the jerk of the law at hand, which is exact about it, and in those square
-    to it.
+    Each is kept in the direction of the jerk of the law at hand, which is exact about it, in 15 more of
+    the plane of both this and the path, and square to it: a box would let the law jump from corner to corner.
 
     Attributes:
         path: Of the tool.
@@ -188,9 +192,9 @@ class ToolJerkConstraint:
         rows = list[Array]()
         for part in limited:
             frame = _frame(_jerk(orders[:, part], (v, a, u)), orders[0, part])
-            rows.append(np.concatenate([frame, -frame], axis=1) @ orders[:, part, :, :, None])
+            rows.append((_AROUND @ frame) @ orders[:, part, :, :, None])
         first, second, third = np.concatenate(rows, axis=2)[..., 0]
-        limits = np.repeat([self.jerk[part] for part in limited], 6)
+        limits = np.repeat([self.jerk[part] for part in limited], len(_AROUND))
         return JerkRows(first, second, third, np.broadcast_to(limits, first.shape))
 
     def excess(self, law: LawPieces) -> Array:

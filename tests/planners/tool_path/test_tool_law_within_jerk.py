@@ -6,9 +6,11 @@ import json
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.curves.extrema import peaks
 from trajcli.job.read import job_from_text
+from trajcli.kinematics.forward import forward
 from trajcli.planning.plan import plan_job
 
 START = [0, -1.57, 1.57, -1.57, -1.57, 0]
@@ -66,3 +68,47 @@ def test_a_law_may_name_a_lower_jerk():
     limits = {"acceleration": 10, "tcp": {"speed": 0.25, "acceleration": 2.0, "jerk": 20.0}}
     slower, faster = (fastest(ARC, limits, jerk=jerk).trajectory.duration for jerk in (5.0, 20.0))
     assert slower > 1.01 * faster
+
+
+GANTRY = {
+    "convention": "standard",
+    "base": {"rpy": [0, 90, 0]},
+    "joints": [
+        {"type": "prismatic", "alpha": -90},
+        {"type": "prismatic", "theta": -90, "alpha": -90},
+        {"type": "prismatic"},
+    ],
+}
+
+
+@pytest.mark.parametrize("own", few([{}, {"jerk": 100}], 1))
+def test_a_circle_is_cruised_at_the_speed_whose_jerk_is_the_limit(own):
+    """On a circle of radius r the acceleration v^2 / r turns with v / r: a jerk of v^3 / r^2."""
+    radius, jerk, durations = 0.2, 5.0, []
+    for turns in (1, 2):
+        arc = {"planner": "arc", "center": [radius, 0, 0], "axis": "z", "angle": 360 * turns}
+        job = {
+            "version": 1,
+            "units": {"angle": "deg"},
+            "robot": GANTRY,
+            "limits": {"velocity": 10, "acceleration": 100, **own, "tcp": {"jerk": jerk}},
+            "start": {"joints": [0, 0, 0]},
+            "moves": [arc | {"law": {"shape": "time_optimal"}}],
+        }
+        made = plan_job(job_from_text(json.dumps(job)))
+        assert made.verdict.passed
+        assert not made.events  # it is not stretched as a whole
+        durations.append(made.trajectory.duration)
+    cruise = (jerk * radius**2) ** (1 / 3)
+    assert durations[1] - durations[0] == pytest.approx(2 * np.pi * radius / cruise, rel=5e-3)
+
+
+@pytest.mark.full
+def test_the_jerk_of_the_tool_around_a_rounded_corner_is_used_and_kept():
+    """Third differences of the positions at 1 kHz: most of the motion is within 10 % of the limit."""
+    made = fastest(CORNER, {"acceleration": 20, "tcp": {"jerk": 10.0}})
+    t = np.arange(0.0, made.trajectory.duration, 1e-3)
+    positions = forward(made.loaded.robot, made.trajectory.curve.evaluate(t))[:, :3, 3]
+    sizes = np.linalg.norm(np.diff(positions, 3, axis=0), axis=1) / 1e-9
+    assert sizes.max() < 10.0 * 1.001
+    assert np.mean(sizes > 9.0) > 0.7

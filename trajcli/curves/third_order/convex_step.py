@@ -71,12 +71,17 @@ def _rows(samples: Sequence[Sample], limits: LawLimits, lowered: Array) -> tuple
     second = [[_second_order(sample, each, lowered) for sample in samples] for each in limits.second]
     caps = [row for cap, _ in map(_over_interval, second) for row in cap]
     others = [row for _, rows in map(_over_interval, second) for row in rows]
-    others += [_third_order(sample, each, lowered[2]) for each in limits.third for sample in samples[::2]]
+    third = [
+        (each, _third_order(sample, each, lowered[2])) for each in limits.third for sample in samples[::2]
+    ]
+    others += [row for _, row in third]
     rows, slack = (np.concatenate(parts, axis=-2) for parts in zip(*others, strict=True))
-    if len(slack) > _KEPT:
+    # rows of a vector crowd around its direction: they must not take the places of all others
+    kept = _KEPT + sum(len(row[1]) for each, row in third if each.curved) // 2
+    if len(slack) > kept:
         size = np.sqrt((rows[0] + rows[2]) ** 2 + rows[1] ** 2 + rows[3] ** 2 + _TINY)
         rank = np.rint(_RANKS * np.arcsinh(slack / size / _NEAR))  # rounding must not choose between equals
-        nearest = np.argsort(rank, axis=0, kind="stable")[:_KEPT]
+        nearest = np.argsort(rank, axis=0, kind="stable")[:kept]
         slack = np.take_along_axis(slack, nearest, axis=0)
         rows = np.take_along_axis(rows, nearest[None], axis=1)
     cap_rows, cap_slack = (np.concatenate(parts, axis=-2) for parts in zip(*caps, strict=True))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.third_order.jerk import LawJerkConstraint
+from trajcli.curves.third_order.jerk import ThirdOrderConstraint
 from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion, motion_along
@@ -17,7 +17,7 @@ from trajcli.planners.course import Course, PathRates, law_bounds
 from trajcli.planners.tool_constraint import ToolConstraint
 from trajcli.planners.tool_path.follow import FollowedPath
 from trajcli.planners.tool_path.law import LawSpec
-from trajcli.planners.tool_path.time_optimal import jerk_of_law, limits_of_law
+from trajcli.planners.tool_path.time_optimal import jerk_constraints, limits_of_law
 
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
 
@@ -70,9 +70,9 @@ class ToolCourse(Course):
         return speed, change, change if self.law.deceleration is None else min(change, self.law.deceleration)
 
     @property
-    def jerk_constraints(self) -> tuple[LawJerkConstraint, ...]:
-        """The limit of sddd by that of the jerk of the tool; none where it turns in its place."""
-        return jerk_of_law(self.tcp, angular=self.joints.path.poses.pure_rotation)
+    def jerk_constraints(self) -> tuple[ThirdOrderConstraint, ...]:
+        """The limits of the jerk of the tool along it, and of its law."""
+        return jerk_constraints(self.joints, self.curve, self.law)
 
     def tool_rates(self, s: Array) -> Array:
         """Return sizes of p', p'', w and w' at s (N,), (4, N)."""

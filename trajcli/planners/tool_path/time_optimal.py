@@ -17,7 +17,7 @@ from trajcli.curves.piecewise import (
     PiecewisePolynomial,
     distinct,
 )
-from trajcli.curves.third_order.jerk import LawJerkConstraint
+from trajcli.curves.third_order.jerk import LawJerkConstraint, ThirdOrderConstraint
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, time_optimal
@@ -39,10 +39,11 @@ from trajcli.planners.effort_limits import (
 )
 from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
 from trajcli.planners.planner import LITTLE, Event, Phase, stretched
-from trajcli.planners.tool_constraint import ToolConstraint
+from trajcli.planners.tool_constraint import ToolConstraint, ToolJerkConstraint
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
 
+_SAMPLES = 33  # of a path, at which it is looked at whether it bends
 _FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
 
 
@@ -71,15 +72,15 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
 
         turns = path.poses.pure_rotation
         along = (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)
-        of_law = jerk_of_law(tcp, angular=path.poses.pure_rotation)
-        keeps_jerk = bool(of_law) or _moving(curve)[np.isfinite(limits.jerk).any(axis=1)].any()
+        of_jerk = jerk_constraints(joints, curve, spec)
+        keeps_jerk = bool(of_jerk) or _moving(curve)[np.isfinite(limits.jerk).any(axis=1)].any()
 
         def solve(efforts: tuple[PathConstraint, ...]) -> TimeOptimalMotion:
             every, bounds = (*further, *efforts), (limits.velocity, limits.acceleration)
             if not keeps_jerk:
                 return time_optimal(curve, *bounds, further=every, along=along)
             return jerk_limited_time_optimal(
-                curve, *bounds, limits.jerk, further=every, further_jerk=of_law, along=along
+                curve, *bounds, limits.jerk, further=every, further_jerk=of_jerk, along=along
             )
 
         solved = solved_within_efforts(curve, robot, solve)
@@ -106,9 +107,31 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     return JointMotion(trajectory, motion, tuple(phases), events, plane, 2 if keeps_jerk else 1)
 
 
-def jerk_of_law(limits: ToolLimits, *, angular: bool) -> tuple[LawJerkConstraint, ...]:
-    """Return the constraint of the jerk of the tool along its path; none where it has no limit, or rests."""
-    return () if angular or math.isinf(limits.jerk) else (LawJerkConstraint(limits.jerk),)
+def jerk_constraints(
+    joints: FollowedPath, curve: PiecewisePolynomial, spec: LawSpec
+) -> tuple[ThirdOrderConstraint, ...]:
+    """Return what limits the jerk of the tool, and of its law, along a path.
+
+    Along a straight line the jerk of the tool is that of the law, and one that the law names takes its place.
+
+    Args:
+        joints: Along the path.
+        curve: q(s).
+        spec: The law.
+    """
+    robot, limits = joints.robot, joints.robot.limits.tcp
+    _, first, second = joints.executed.poses.evaluate(np.linspace(0.0, joints.path.length, _SAMPLES), "right")
+    straight = not second[:, :3].any()
+    along = (limits.jerk if spec.jerk is None else spec.jerk) if straight else spec.jerk or math.inf
+    of_tool = (math.inf if straight else limits.jerk), limits.angular_jerk
+    found = list[ThirdOrderConstraint]()
+    if math.isfinite(along) and first[:, :3].any():
+        found.append(LawJerkConstraint(along))
+    if np.isfinite(of_tool).any():
+        from trajcli.planners.joint_course import ToolOfJoints
+
+        found.append(ToolJerkConstraint(ToolOfJoints(curve, robot), of_tool))
+    return tuple(found)
 
 
 def _moving(curve: PiecewisePolynomial) -> NDArray[np.bool_]:
