@@ -155,26 +155,62 @@ def test_a_tool_at_its_limits_is_no_false_alarm(orders: int) -> None:
     assert not judge_motion(lambda: (motion,), Requirements(tight, tool=lambda: ToolJudge(tight, {}))).passed
 
 
-@pytest.mark.parametrize("half", [1, -1])
-def test_a_determinant_of_zero_on_a_row_hides_no_change_of_branch(half: int) -> None:
-    """A planar arm straightens along x on a row, where the rows of its Jacobian across x are exactly zero."""
+@cache
+def planar_line() -> PlannedJob:
     path = {"xyz": [0.35, 0.25, 0.0], "yaw": 1.5, "tool_axis": "x"}
     line = {"planner": "line", "to": path, "law": {"shape": "quintic", "duration": 1}}
-    job = trajcli.plan(
+    return trajcli.plan(
         {"version": 1, "robot": "planar3r", "start": {"joints": [-0.2, 1.0, 0.3]}, "moves": [line]}
     )
-    paths = {0: job.moves[0].planned.tool}
-    elbow = np.arange(20, -21, -1) / 100.0
-    q = np.stack([np.zeros(41), np.where(elbow < 0, half * elbow, elbow), np.zeros(41)], axis=1)
+
+
+def changes_of_branch(elbow: np.ndarray, size: int) -> list[tuple[int | None, float | None, int]]:
+    """Return rows, times and counts of changes found of a planar arm that is straight where its elbow is at zero.
+
+    There the rows of its Jacobian across x are exactly zero.
+    """
+    job = planar_line()
+    q = np.stack([0 * elbow, elbow, 0 * elbow], axis=1)
     off = np.full(3, 0.5e-9)
-    resolution = Resolution(0.5e-9, off, off, off)
+    resolution, moves = Resolution(0.5e-9, off, off, off), np.zeros(len(q), int)
     rows = RecordedMotion(
-        np.arange(41) / 50.0, q, None, None, None, None, np.zeros(41, int), None, resolution, "rows"
+        np.arange(len(q)) / 50.0, q, None, None, None, None, moves, None, resolution, "rows"
     )
     robot = job.moves[0].robot
-    required = Requirements(robot, tool=lambda: ToolJudge(robot, paths))
-    found = [each for each in judge_motion(lambda: [rows], required).findings if each.kind == "branch"]
-    assert [each.row for each in found] == ([22] if half == 1 else [])
+    required = Requirements(robot, tool=lambda: ToolJudge(robot, {0: job.moves[0].planned.tool}))
+    blocks = [part(rows, slice(low, low + size)) for low in range(0, len(q), size)]
+    found = judge_motion(lambda: blocks, required).findings
+    return [(each.row, each.time, each.count) for each in found if each.kind == "branch"]
+
+
+@pytest.mark.parametrize("size", [41, 22, 21, 20, 10, 1])
+@pytest.mark.parametrize("half", [1, -1])
+def test_a_determinant_of_zero_on_a_row_hides_no_change_of_branch(half: int, size: int) -> None:
+    """However rows come in blocks: it is in one row, and in the middle between two."""
+    elbow = np.arange(20, -21, -1) / 100.0
+    found = changes_of_branch(np.where(elbow < 0, half * elbow, elbow), size)
+    assert found == ([(22, pytest.approx(21 / 50), 2)] if half == 1 else [])
+
+
+@pytest.mark.parametrize(("first", "at"), [(1.0, 1024), (-1.0, 1024), (1.0, 1025), (1.0, 2047)])
+def test_a_change_of_branch_at_the_end_of_rows_that_are_judged_together_is_found(
+    first: float, at: int
+) -> None:
+    """A thousand and some are; the row before it is straight, and the branch at first may be another one."""
+    elbow = np.where(np.arange(2060) < 100, first, 1.0) * np.where(np.arange(2060) < at, 0.1, -0.1)
+    elbow[at - 1] = 0.0
+    ((row, time, count),) = changes_of_branch(elbow, 3000)
+    place = at if first > 0 else 100
+    assert count == (2 if first > 0 else 4)
+    assert (row, time) in [(place, pytest.approx((place - 0.5) / 50)), (place + 1, pytest.approx(place / 50))]
+
+
+@pytest.mark.parametrize("size", [60, 15, 7])
+def test_changes_of_branch_are_counted_from_the_first_one(size: int) -> None:
+    """There are four, in rows and between them; a file that begins straight begins on no branch."""
+    signs = np.where((np.arange(60) // 15) % 2 == 0, 1.0, -1.0)
+    elbow = 0.1 * np.roll(signs, -6) * np.where(np.arange(60) < 3, 0.0, 1.0)
+    assert changes_of_branch(elbow, size) == [(10, pytest.approx(9 / 50), 8)]
 
 
 SQUARE = {

@@ -27,7 +27,7 @@ _STEPS = 8  # of Gauss and Newton from there
 _ROWS = 1024  # at a time
 _INSIDE = 1e-6  # of the distance of samples: so far from a corner a place is on its side
 _LATE = 1e-9  # s: by so much the stamp of a row at the end of a move is beyond it
-_FURTHER = 2.0  # times the way of the tool from row to row: how far along the path it may get
+_FURTHER = 2.0  # times the longer of two steps of the tool from row to row: how far along the path it may get
 
 
 class RecordedPath:
@@ -57,12 +57,13 @@ class RecordedPath:
         inner = np.linspace(0.0, self._path.length, _SAMPLES)
         self._s = np.unique(np.concatenate([inner, self._path.breaks]))
         self._poses = self._path.poses.evaluate(self._s, "right")[0]
-        self._sign = 0.0
+        self._signs = [0.0, 0.0]  # of the determinant in the last row, and in the last middle between rows
         step = self._path.length / _SAMPLES
         self._slack, self._near = 2.0 * step, step**2  # samples beside a place, and squared distances alike
         self._limits = np.array([motion.tolerance.position, motion.tolerance.angle])
         self._fast = float(peaks(motion.law, (1,))[0].magnitude[0])
         self._before: tuple[float, Array, float] | None = None  # place, coordinates and time of a row
+        self._step = 0.0  # of the tool, up to that row
         self._begins = next((part.start for part in parts if part.tool is motion), 0.0)
         self._ends = parts[-1].end if parts else motion.law.end
         borders = motion.law.evaluate(np.array([motion.law.start, motion.law.end]))[:, 0]
@@ -157,7 +158,7 @@ class RecordedPath:
         target = self._path.at_s(s, "right").target()
         of_rows = determinants(target, poses, jacobians, self._arm)
         if of_rows is not None:
-            self._watch_branch(np.sign(of_rows), t, numbers)
+            self._watch_branch(np.sign(of_rows), t, numbers, int(before is not None))
         return s
 
     def _sizes(self, s: Array, poses: Array) -> Array:
@@ -250,7 +251,7 @@ class RecordedPath:
         return np.asarray(s)
 
     def _followed(self, square: Array, own: Array, t: Array, poses: Array) -> NDArray[np.intp]:
-        """Return the indices of the nearest samples, each no further from the one before than the tool moves.
+        """Return the indices of the nearest samples, each no further from the one before than the tool gets.
 
         A path may pass a place twice, or end where it starts: of the first row the earliest place counts, and
         behind it, of places that are as near, the one to which the tool gets when it goes on along the path.
@@ -271,7 +272,8 @@ class RecordedPath:
             else:
                 at, last, time = self._before
                 moved = float(np.linalg.norm(coordinates - last))
-                reach = _FURTHER * moved + self._fast * (float(t[k]) - time) + self._slack
+                reach = _FURTHER * max(moved, self._step) + self._fast * (float(t[k]) - time) + self._slack
+                self._step = moved  # around the end of a way that is its own way back the next one is short
                 low, high = np.searchsorted(self._s, [at - reach, at + reach])
                 window = square[k, low : max(high, low + 1)]
                 near = low + np.flatnonzero(window <= window.min() + self._near)
@@ -328,11 +330,11 @@ class RecordedPath:
                 chosen=chosen,
             )
 
-    def _watch_branch(self, signs: Array, t: Array, numbers: NDArray[np.int64]) -> None:
-        """Note where the determinant of the rows that the path fixes changes its sign."""
-        signs = np.append(self._sign, signs)
+    def _watch_branch(self, signs: Array, t: Array, numbers: NDArray[np.int64], kind: int) -> None:
+        """Note where the determinant that the path fixes changes its sign, in rows, 0, or in middles, 1."""
+        signs = np.append(self._signs[kind], signs)
         changes = changes_of_sign(signs) - 1
-        self._sign = float(signs[signs != 0.0][-1]) if signs.any() else 0.0
+        self._signs[kind] = float(signs[signs != 0.0][-1]) if signs.any() else 0.0
         if not changes.size:
             return
 
