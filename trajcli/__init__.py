@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from trajcli.job.model import Job
     from trajcli.job.read import LoadedJob, job_from_text, load_job
     from trajcli.job.report import Report
+    from trajcli.job.schema import schema_of
     from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
     from trajcli.output.report import report_of, verification_error
@@ -66,6 +67,7 @@ _HOMES = {
     "trajcli.job.model": ("Job",),
     "trajcli.job.read": ("LoadedJob", "job_from_text", "load_job"),
     "trajcli.job.report": ("Report",),
+    "trajcli.job.schema": ("schema_of",),
     "trajcli.catalogue.entries": ("catalogue_names",),
     "trajcli.judge.judgement": ("Judgement",),
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
@@ -119,6 +121,7 @@ __all__ = [
     "report_of",
     "resample",
     "retime",
+    "schema_of",
     "sweep",
     "verification_error",
     "view",

@@ -11,11 +11,12 @@ from hypothesis import HealthCheck, given, settings
 from jsonschema import Draft202012Validator
 from random_mappings import jobs
 
+from trajcli import schema_of
 from trajcli.catalogue.entries import catalogue_names, robot_file
 from trajcli.cli.init import STARTER
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
-from trajcli.job.schema import SchemaKind, schema_of, schema_text
+from trajcli.job.schema import SchemaKind, schema_text
 from trajcli.job.yaml.load import parse_document, read_document
 from trajcli.planners import HANDLING, PLANNERS
 
