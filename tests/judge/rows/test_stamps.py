@@ -61,3 +61,23 @@ def test_stamps_of_a_clock_since_1970_are_multiples_block_by_block() -> None:
         stamps = Stamps(0.0, 0.0)
         for block in np.split(np.array(exact), 3):
             assert stamps.taken(block)[1].all()
+
+
+@pytest.mark.parametrize("first", [5, 7, -3])
+def test_rounded_stamps_that_begin_anywhere_are_multiples(first: int) -> None:
+    """The first one is rounded, too: 0.208333 s is 5/24 s."""
+    meant = [float(Fraction(k, 24)) for k in range(first, first + 9)]
+    times, exact = Stamps(MICROSECONDS, 0.0).taken(np.round(meant, 6))
+    assert exact.all()
+    np.testing.assert_allclose(times, meant, rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("count", [4, 5, 40])
+@pytest.mark.parametrize("late", [1, 2, 3])
+def test_the_last_stamp_alone_may_be_beside_its_multiple(late: int, count: int) -> None:
+    """The one that ends the motion; others show that there is no period, and all are as they are written."""
+    t = 0.1 * np.arange(count)
+    t[-late] += 0.05 if late > 1 else -0.05
+    times, exact = Stamps(MICROSECONDS, 0.0).taken(t)
+    assert exact.tolist() == [late == 1] * (count - 1) + [False]
+    np.testing.assert_allclose(times, t, atol=1e-9)
