@@ -414,6 +414,23 @@ def test_velocity_by_position() -> None:
             assert found[0].count == int((~inside).sum())
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize(("faster", "broken"), [(-1e-9, False), (0.0, False), (5e-9, True)])
+def test_a_joint_that_is_just_as_fast_as_the_end_of_its_range_allows(
+    faster: float, side: float, *, broken: bool
+) -> None:
+    """Each step is sqrt(12 x) - 0.3 - 1e-3 times a millisecond: rounding of positions is some 1e-13 of that."""
+    rows, upper = motion(rows=21, decimals=None), 2.7501
+    q = np.tile(HOME[7], (21, 1))
+    q[0, 0] = upper - 0.1
+    for k in range(20):
+        q[k + 1, 0] = q[k, 0] + 1e-3 * (np.sqrt(12 * (upper - q[k, 0])) - 0.3 - 1e-3) * (1 + faster)
+    q[:, 0] *= side
+    moved = replace(rows, q=q, qd=np.zeros_like(q), qdd=np.zeros_like(q))
+    found = judged(moved, "franka-fr3", Surroundings(rows.joints, q[0])).findings
+    assert ("fr3-velocity-by-position" in {each.rule for each in found}) == broken
+
+
 def test_a_joint_may_not_move_within_its_dead_zone() -> None:
     """o^2 / (2 d) = 7.5 mrad before its limit joint 1 may only leave."""
     rows = motion(rows=501, decimals=None)
