@@ -83,6 +83,19 @@ def test_motion_in_either_direction_at_both_ends(side: float, name: str, row: in
 
 
 @SIDES
+@pytest.mark.parametrize(("name", "within"), [("qd", 1e-6), ("qdd", 1e-3)])
+@pytest.mark.parametrize(("row", "at"), [(0, "start"), (-1, "end")])
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.1, True)])
+def test_rest_is_told_as_well_as_the_decimals_tell(
+    share: float, row: int, at: str, name: str, within: float, side: float, *, broken: bool
+) -> None:
+    """Beside what counts as rest half a unit of the last decimal is allowed, here as much again."""
+    off = replace(FRANKA.resolution, **{name: np.full(7, within)})
+    rows = with_value(replace(FRANKA, resolution=off), name, row, 3, side * share * 2 * within)
+    assert (f"fr3-rest-{at}" in rules(rows, "franka-fr3")) == broken
+
+
+@SIDES
 @pytest.mark.parametrize("reverse", [False, True], ids=["end", "start"])
 @pytest.mark.parametrize("order", [1, 2])
 def test_rest_of_positions_alone_in_either_direction(side: float, reverse: bool, order: int) -> None:

@@ -97,6 +97,27 @@ def test_a_segment_that_becomes_zero_microseconds_aborts() -> None:
     assert breach.value == pytest.approx(3e-7, abs=1e-12)
 
 
+@pytest.mark.parametrize("shortest", [5, 6])
+def test_of_segments_that_become_zero_the_shortest_is_named(shortest: int) -> None:
+    rows = CLEAN["ur-passthrough"]
+    t, q, qd, qdd = (
+        np.insert(values, [5, 5], values[4], axis=0) for values in (rows.t, rows.q, rows.qd, rows.qdd)
+    )
+    t[5:7] = t[4] + (1e-7 if shortest == 5 else 4e-7), t[4] + 5e-7
+    verdict = judged(replace(rows, t=t, q=q, qd=qd, qdd=qdd), "ur-passthrough")
+    breach = {each.rule: each for each in verdict.findings}["passthrough-durations"]
+    assert (breach.row, breach.count, breach.move) == (shortest + 1, 2, None)
+    assert breach.value == pytest.approx(1e-7, abs=1e-12)
+
+
+@pytest.mark.parametrize("named", [None, ("a", "b")])
+def test_joints_that_nobody_names_are_numbered(named: tuple[str, ...] | None) -> None:
+    """Names of a robot that has other joints are none of these."""
+    rows = replace(with_value(CLEAN["franka-fr3"], "q", 500, 4, 1e-3), joints=None)
+    found = judged(rows, "franka-fr3", Surroundings(named, HOME[7])).findings
+    assert {each.joint for each in found if each.rule == "fr3-acceleration"} == {"q5"}
+
+
 def test_a_first_point_at_time_zero_is_no_zero_duration() -> None:
     assert CLEAN["ur-passthrough"].t[0] == 0
 

@@ -99,6 +99,18 @@ def test_a_payload_counts(rows: Path) -> None:
     assert not [found for found in efforts(rows, 0.999 * most) if found.move == 0]
 
 
+def test_limits_that_are_given_beside_a_payload_are_in_force(rows: Path) -> None:
+    """Tighter ones than the maker's, and his where none are given."""
+    most, _ = peak_of(rows, 0, 2.0)
+    (rows / "limits.yaml").write_text(f"effort: {{a: {0.5 * most!r}}}\n")
+    heavy = {"robot": str(rows / "arm.yaml"), "payload": "{mass: 2}"}
+    (found,) = (
+        each for each in efforts(rows, 2 * most, **heavy, limits=str(rows / "limits.yaml")) if each.move == 0
+    )
+    assert found.limit == pytest.approx(0.5 * most)
+    assert not [each for each in efforts(rows, 2 * most, **heavy) if each.move == 0]
+
+
 def test_a_job_says_what_each_move_carries(rows: Path) -> None:
     most = peak_of(rows, 2, 3.0)[0]
     assert most > peak_of(rows, 2, 0.0)[0] * 1.2

@@ -125,6 +125,9 @@ def test_a_wrong_column_beside_joints_is_found(
     found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv"))
     assert set(found) == {quantity}
     assert (found[quantity].row, found[quantity].count) == (41, 1)
+    unit = "rad" if "angular" in quantity else "m"
+    order = "/s^2" if "acceleration" in quantity else "/s" if "velocity" in quantity else ""
+    assert found[quantity].si_unit == unit + order
     assert found[quantity].value == pytest.approx(value, rel=1e-4)
     assert 0 < (found[quantity].limit or 0.0) < 1e-3 * value
 

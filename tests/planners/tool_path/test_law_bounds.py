@@ -101,6 +101,27 @@ def test_a_duration_below_the_shortest_is_refused(shape: str) -> None:
         LAWS[shape].segment(LawSpec(shape=shape), 0.7, bounds, shortest * (1 - 1e-6))
 
 
+def test_a_refusal_says_what_the_law_would_reach() -> None:
+    """A quintic over 0.6 m in 0.4 s: 15/8 of 1.5 m/s, which is allowed, and 10 / sqrt(3) of 3.75 m/s^2, which is not."""
+    bounds = PathBounds(9.0, 5.0, 5.0, 900.0)
+    with pytest.raises(PlanningError) as refused:
+        LAWS["quintic"].segment(LawSpec(shape="quintic"), 0.6, bounds, 0.4)
+    (problem,) = refused.value.problems
+    amounts = problem.amounts
+    assert amounts["reached"].value == pytest.approx(10 / math.sqrt(3) * 0.6 / 0.4**2)
+    assert amounts["fastest"].value == pytest.approx(math.sqrt(10 / math.sqrt(3) * 0.6 / 5.0))
+    said = problem.text()
+    assert said.startswith(
+        "a quintic law over 0.6 m in 0.4 reaches 21.6506351 m/s^2, but the law says at most 5 m/s^2"
+    )
+
+
+@pytest.mark.parametrize("shape", ["cubic", "quintic", "cycloidal"])
+def test_a_smooth_law_has_no_breaks_but_its_ends(shape: str) -> None:
+    made = LAWS[shape].segment(LawSpec(shape=shape), 0.7, PathBounds(1.3, 5.0, 5.0, 90.0), 4.0)
+    assert made.breaks.tolist() == [0.0, 4.0]
+
+
 def cornered() -> ToolPath:
     """Return a path of 0.3 m, then 0.6 m square to it: a law stops between."""
     corner = np.array([0.3, 0.0, 0.0])
