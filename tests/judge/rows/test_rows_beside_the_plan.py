@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -87,6 +88,23 @@ def test_one_number_of_one_row_is_off_by_a_unit_of_its_last_decimal(column, sign
         found = compared(tmp_path, plan, rows, ".6f")
         assert not found.planned
         assert f"row {row % len(rows) + 1} has {NAMES[column]}" in found.difference
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_column_that_is_wrong_is_named_with_its_numbers_beside_a_coarse_one(sign, plan, tmp_path) -> None:
+    """Degrees of one decimal are off by more than the third joint, and as far as they may be."""
+    rows = np.hstack([rows_at()[:, :1], np.degrees(rows_at()[:, 1:4])])
+    true = float(rows[5, 3])
+    rows[5, 3] += sign * 1e-3
+    lines = [f"{t:.9f},{first:.1f},{second:.9f},{third:.9f}" for t, first, second, third in rows.tolist()]
+    file = tmp_path / "rows.csv"
+    file.write_text("\n".join(["t,q1_deg,q2_deg,q3_deg", *lines]) + "\n", encoding="utf-8")
+    found = compare_with_plan(ByteSource(str(file)), plan)
+    said = re.fullmatch(
+        r".*row 6 has q3_deg ([-.\d]+), the motion has ([-.\d]+) there", found.difference or ""
+    )
+    assert said is not None, found.difference
+    assert [float(each) for each in said.groups()] == pytest.approx([true + sign * 1e-3, true], abs=1e-8)
 
 
 @pytest.mark.parametrize("column", range(1, 10))
