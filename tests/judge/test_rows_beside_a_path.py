@@ -147,6 +147,18 @@ def test_what_bulges_between_rows_on_the_line_is_found_in_the_middle(
     assert found[0].time == pytest.approx(PERIOD * (piece + 0.5))
 
 
+@pytest.mark.parametrize("side", [0, 2])
+def test_what_bulges_to_the_other_side_of_the_rectangle_is_beside_its_own(side: int) -> None:
+    """The middle between two rows is on the path, 0.2 m across from its rows and 0.15 m from the sides at their corners."""
+    places, piece = along(4, 201), 30 + 50 * side
+    velocities = np.zeros_like(places)
+    velocities[piece, 1] = (1 - side) * 4 * 0.2 / PERIOD
+    velocities[piece + 1, 1] = -velocities[piece, 1]
+    (found,) = deviations(places, 4, velocities)
+    assert found.row == piece + 1
+    assert 0.1475 <= (found.value or 0.0) <= 0.2 * (1 + 1e-9)
+
+
 def test_the_rectangle_is_driven_in_its_order() -> None:
     """Backward around it, or across it from one corner to the next but one, rows are not where the tool goes."""
     assert deviations(along(4, 201)[::-1], 4)

@@ -135,6 +135,18 @@ def test_what_rounding_leaves_is_no_jump(sign):
     assert curvature_jumps(still, both[:1]).size == 0
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_where_a_path_lies_says_nothing_about_its_bends(sign):
+    """A slide a thousand kilometres away jumps as one at home does, and one that does not there does not here."""
+    both = np.array([[-5.0, 5.0]])
+    for jump, found in ((1e-4 * sign, 1), (1e-9 * sign, 0)):
+        path = bending(np.array([[jump]]))
+        for away in (0.0, 1e6):
+            coefficients = path.coefficients.copy()
+            coefficients[-1] += away - coefficients[-1, :1]
+            assert curvature_jumps(PiecewisePolynomial(path.breaks, coefficients), both).size == found
+
+
 @pytest.mark.parametrize("last", [True, False])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_larger_end_of_a_piece_counts(sign, last):
