@@ -13,6 +13,7 @@ from recorded_rows import part
 
 import trajcli
 from trajcli.api.plans import PlannedJob
+from trajcli.findings import Finding
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
@@ -326,6 +327,34 @@ def test_between_rows_a_tool_that_goes_to_and_fro_is_on_the_pass_of_its_time(rat
         each.value or 0.0 for each in found if (each.kind, each.quantity) == ("deviation", "orientation")
     ]
     assert 0 < max(turned) < 0.02 / 30
+
+
+@pytest.mark.parametrize("axis", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.0, -0.8]])
+def test_a_tool_that_turns_in_its_place_is_turned_from_its_path_by_how_much(axis: list[float]) -> None:
+    """About a fixed axis by 0.6 rad: all rows of the plan are on it, but for one that turns about another axis."""
+    about = np.sin(0.3) * np.array(axis)  # times the quaternion of its start, of half a turn about x
+    end = {"xyz": [0.4, 0.1, 0.25], "quat_wxyz": [-about[0], np.cos(0.3), about[2], -about[1]]}
+    limits = {"tcp": {"angular_speed": 1.0, "angular_acceleration": 4.0}}
+    made = trajcli.plan({**SQUARE, "limits": limits, "moves": [{"planner": "line", "to": end}]})
+    rows, robot, off = made.trajectory.sample(250), made.moves[0].robot, np.full(6, 0.5e-12)
+    paths, resolution = {0: made.moves[0].planned.tool}, Resolution(0.5e-9, off, off, off)
+    moves = np.zeros(len(rows), int)
+    required = Requirements(robot, interpolate="hold", tool=lambda: ToolJudge(robot, paths))
+
+    def deviations(q: np.ndarray) -> list[Finding]:
+        motion = RecordedMotion(rows.t, q, None, None, None, None, moves, None, resolution, "rows")
+        found = judge_motion(lambda: [motion], required).findings
+        return [each for each in found if each.kind == "deviation"]
+
+    assert deviations(rows.q) == []
+    q, aside = (
+        rows.q.copy(),
+        1e-4 * np.cross(axis, [0.0, 0.6, 0.8]) / np.linalg.norm(np.cross(axis, [0.0, 0.6, 0.8])),
+    )
+    q[60] += np.linalg.solve(trajcli.load_robot("ur5e").jacobian(q[60]), [0.0, 0.0, 0.0, *aside])
+    (found,) = deviations(q)
+    assert (found.row, found.quantity, found.value) == (61, "orientation", pytest.approx(1e-4, rel=1e-3))
+    assert found.text().endswith("promised are 1e-06 rad")
 
 
 HALF_CIRCLE = """

@@ -279,3 +279,12 @@ def test_without_limits_of_jerk_an_acceleration_steps_between_its_limits(
     limits = replace(unlimited(1), acceleration=np.array([[-a, a]]))
     found = inconsistent(rows(moved, speed, np.zeros(12), t=t), limits)
     assert [each.quantity for each in found] == (["acceleration"] if broken else [])
+
+
+@pytest.mark.parametrize("count", [10, 20, 40])
+@pytest.mark.parametrize("milliseconds", [7, 9, 10])
+def test_few_rows_of_whole_milliseconds_are_no_contradiction(milliseconds: int, count: int) -> None:
+    """With three decimals 1/142 s fits twenty rows of 7 ms, over which velocities would be half a percent off."""
+    t = np.round(np.arange(count) * milliseconds / 1000, 3)
+    assert inconsistent(rows(np.sin(3 * t), 3 * np.cos(3 * t), t=t, late=5e-4)) == []
+    assert inconsistent(rows(np.sin(3 * t), 3.03 * np.cos(3 * t), t=t, late=5e-4))

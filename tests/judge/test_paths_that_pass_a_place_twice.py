@@ -31,6 +31,7 @@ RECTANGLE = ((0.3, 0.0), (0.3, 0.2), (0.0, 0.2), (0.0, 0.0))
 TO_AND_FRO = ((0.3, 0.0), (0.0, 0.0), (0.0, 0.2))
 LOOP = ((0.051, 0.0), (0.051, 0.001), (0.05, 0.001), (0.05, 0.0), (0.05, -0.04))
 HAIRPIN = ((0.3, 0.0), (0.3, 0.004), (0.0, 0.004))
+NARROW = ((0.3, 0.0), (0.3, 0.0003), (0.0, 0.0003))
 
 
 @cache
@@ -56,7 +57,11 @@ def along(corners: Corners, s: Array) -> Array:
 
 
 def deviations(
-    corners: Corners, places: Array, joined: Interpolation = "hold", period: float = PERIOD
+    corners: Corners,
+    places: Array,
+    joined: Interpolation = "hold",
+    period: float = PERIOD,
+    velocities: Array | None = None,
 ) -> list[Finding]:
     """Return where rows of the tool at places (N, 3), and what joins them, are beside the path."""
     made, count, exact = planned(corners), len(places), np.zeros(3)
@@ -65,7 +70,9 @@ def deviations(
     axes = np.stack([forward(robot, unit)[:3, 3] - origin for unit in np.eye(3)], axis=1)
     q, moves = (START + places - origin) @ axes, np.zeros(count, dtype=np.int64)
     resolution = Resolution(0.0, exact, exact, exact)
-    rows = RecordedMotion(period * np.arange(count), q, *(None,) * 4, moves, None, resolution, "rows", 1)
+    qd = None if velocities is None else velocities @ axes
+    t = period * np.arange(count)
+    rows = RecordedMotion(t, q, qd, *(None,) * 3, moves, None, resolution, "rows", 1)
     required = Requirements(
         robot, interpolate=joined, tool=lambda: ToolJudge(robot, {0: made.moves[0].planned.tool})
     )
@@ -131,3 +138,26 @@ def test_dense_rows_get_from_place_to_place(spacing: float) -> None:
     """The path is looked at first at places that are many rows apart."""
     s = np.arange(0.0, 0.3, spacing)[:900]
     assert deviations(LINE, along(LINE, s), period=1e-4) == []
+
+
+@pytest.mark.parametrize("offset", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_a_way_back_beside_the_way_there_is_told_from_it_by_where_it_is(offset: float) -> None:
+    """It is 0.3 mm away, half of how far apart the places are at which the path is looked at first."""
+    s = np.arange(offset * 3e-3, 0.6003, 3e-3)
+    places = along(NARROW, s)
+    assert deviations(NARROW, places) == []
+    places[150, 1] -= 1e-4
+    assert [(each.row, each.value) for each in deviations(NARROW, places)] == [
+        (151, pytest.approx(1e-4, rel=1e-6))
+    ]
+
+
+@pytest.mark.parametrize("left", [0.15, 0.006, 0.003])
+def test_a_curve_that_bulges_as_far_as_the_way_back_is_beside_the_way_there(left: float) -> None:
+    """Cubics from v to -v across the line are h v / 4 beside it in their middle (Hermite)."""
+    s = np.arange(0.0, 0.3 - left + 0.003, 0.002)
+    velocities = np.tile([0.002 / PERIOD, 0.0, 0.0], (len(s), 1))
+    velocities[-3:-1, 1] = 4 * 0.004 / PERIOD, -4 * 0.004 / PERIOD
+    found = deviations(HAIRPIN, along(HAIRPIN, s), "cubic", velocities=velocities)
+    worst = max(found, key=lambda each: each.value or 0.0)
+    assert (worst.row, worst.value) == (len(s) - 2, pytest.approx(0.004, rel=1e-6))

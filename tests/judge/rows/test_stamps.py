@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from trajcli.judge.rows.stamps import Stamps
+from trajcli.judge.rows.stamps import Stamps, UnfitError
 
 MICROSECONDS = 5e-7  # half a unit of six decimals
 
@@ -81,3 +81,179 @@ def test_the_last_stamp_alone_may_be_beside_its_multiple(late: int, count: int) 
     times, exact = Stamps(MICROSECONDS, 0.0).taken(t)
     assert exact.tolist() == [late == 1] * (count - 1) + [False]
     np.testing.assert_allclose(times, t, atol=1e-9)
+
+
+def written(
+    period: Fraction, decimals: int, first: int, count: int, start: Fraction = Fraction(0)
+) -> np.ndarray:
+    """Return multiples of a period behind some start, rounded to decimals."""
+    return np.array([float(round(start + (first + k) * period, decimals)) for k in range(count)])
+
+
+def in_blocks(stamps: Stamps, t: np.ndarray, sizes: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return what stamps are taken for, and which of them are exact, from blocks of some sizes and the rest."""
+    taken = [stamps.taken(block) for block in np.split(t, np.cumsum(sizes)) if block.size]
+    return np.concatenate([times for times, _ in taken]), np.concatenate([exact for _, exact in taken])
+
+
+PERIODS = [
+    (Fraction(1, 24), 6),
+    (Fraction(1, 30), 3),
+    (Fraction(1, 60), 3),
+    (Fraction(1, 3), 3),
+    (Fraction(1, 300), 4),
+    (Fraction(7, 1000), 3),
+    (Fraction(1, 1000), 3),
+]
+
+
+@pytest.mark.parametrize("first", [0, 1, 5, 100, 20_000])
+@pytest.mark.parametrize(("period", "decimals"), PERIODS)
+def test_rounded_stamps_are_the_multiples_that_they_were(period: Fraction, decimals: int, first: int) -> None:
+    """From whichever multiple on and in whichever blocks; by how much they were moved is the largest rounding."""
+    t = written(period, decimals, first, 2000)
+    true = np.array([float((first + k) * period) for k in range(2000)])
+    for sizes in ([], [700], [1000, 1, 500]):
+        stamps = Stamps(0.5 * 10.0**-decimals, 0.0)
+        times, exact = in_blocks(stamps, t, sizes)
+        assert exact.all()
+        assert stamps.regular
+        np.testing.assert_allclose(times, true, rtol=4e-16)
+        assert stamps.largest_snap == pytest.approx(np.abs(t - true).max(), rel=1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("share", [Fraction(3, 10), Fraction(37, 100), Fraction(8, 10)])
+def test_a_start_between_multiples_was_rounded_itself(share: Fraction, sign: int) -> None:
+    """Distances from it are multiples, and each stamp may be off by its own rounding and by that of the start."""
+    period, decimals = Fraction(1, 30), 3
+    for k in range(8):
+        t = written(period, decimals, 7, 500, sign * (share + Fraction(k, 97)) * period)
+        times, exact = in_blocks(Stamps(5e-4, 0.0), t, [200])
+        assert exact.all()
+        np.testing.assert_allclose(np.diff(times), 1 / 30, rtol=1e-9)
+        assert np.abs(times - t).max() <= 1e-3
+
+
+@pytest.mark.parametrize("at", [2, 3, 150, 190, 260])
+def test_a_stamp_that_was_not_rounded_so_is_no_multiple(at: int) -> None:
+    """It is off by four thirds of half a unit: a thousandth beside its rounding; the first one is a multiple."""
+    t = written(Fraction(1, 3), 3, 1, 400)
+    near = np.flatnonzero(t[at:] - np.floor(t[at:]) > 0.5)[0] + at  # 0.667 of some second
+    t[near] -= 1e-3
+    stamps = Stamps(5e-4, 0.0)
+    if near < 200:
+        assert not stamps.taken(t[:200])[1].any()
+        assert stamps.lattice is None
+        return
+    assert stamps.taken(t[:200])[1].all()
+    with pytest.raises(UnfitError):
+        stamps.taken(t[200:])
+
+
+@pytest.mark.parametrize("size", [2, 50, 99, 100])
+@pytest.mark.parametrize("beyond", [2e-3, -2e-3])
+def test_the_last_stamp_may_stand_at_the_end_of_the_motion(beyond: float, size: int) -> None:
+    """It is kept as it is and moves nothing; where others follow it was none at the end."""
+    t = written(Fraction(1, 100), 4, 0, 100)
+    t[-1] += beyond
+    stamps = Stamps(5e-5, 0.0)
+    if size == 2:
+        assert not in_blocks(stamps, t, [2])[1].any()  # two rows make no period
+        return
+    times, exact = in_blocks(stamps, t, [size])
+    assert exact[:-1].all()
+    assert not exact[-1]
+    assert times[-1] == t[-1]
+    assert stamps.regular
+    assert stamps.largest_snap <= 1e-12
+    with pytest.raises(UnfitError):
+        stamps.taken(t[-1] + np.array([0.01, 0.02]))
+
+
+@pytest.mark.parametrize("at", [1, 20, 49, 50, 51, 70, 98])
+def test_rows_that_are_missing_are_no_fault_and_make_stamps_irregular(at: int) -> None:
+    """In the first block, in the second one, or between them."""
+    t = np.delete(written(Fraction(1, 100), 4, 3, 100), at)
+    for sizes in ([], [50], [50, 20]):
+        stamps = Stamps(5e-5, 0.0)
+        times, exact = in_blocks(stamps, t, sizes)
+        assert exact.all()
+        assert not stamps.regular
+        np.testing.assert_allclose(times, t, rtol=1e-15)
+
+
+def test_stamps_that_shall_not_be_moved_are_as_they_are() -> None:
+    t = written(Fraction(1, 30), 3, 0, 50)
+    times, exact = Stamps(5e-4, 0.0, snap=False).taken(t)
+    assert not exact.any()
+    np.testing.assert_array_equal(times, t)
+
+
+@pytest.mark.parametrize("more", [[0.021], [0.011, 0.051]])
+def test_two_stamps_of_one_multiple_stay_two(more: list[float]) -> None:
+    """A thousandth apart, with three decimals, each may be that multiple alone."""
+    t = np.sort(np.concatenate([written(Fraction(1, 100), 3, 0, 12), more]))
+    assert (np.diff(Stamps(5e-4, 0.0).taken(t)[0]) > 0).all()
+
+
+@pytest.mark.parametrize("gap", [2, 3, 7])
+def test_a_file_may_begin_with_a_gap(gap: int) -> None:
+    t = np.delete(written(Fraction(1, 30), 3, 0, 300), range(1, gap))
+    times, exact = Stamps(5e-4, 0.0).taken(t)
+    assert exact.all()
+    np.testing.assert_allclose(np.diff(times)[1:], 1 / 30, rtol=1e-9)
+
+
+@pytest.mark.parametrize("period", [Fraction(1, 300), Fraction(1, 1000), Fraction(1, 24)])
+def test_stamps_in_single_precision_are_multiples(period: Fraction) -> None:
+    """Later ones were rounded by more than the first ones."""
+    true = np.array([float(k * period) for k in range(3000)])
+    times, exact = in_blocks(Stamps(0.0, 2.0**-24), true.astype(np.float32).astype(float), [1000])
+    assert exact.all()
+    np.testing.assert_allclose(times, true, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_of_all_periods_that_fit_it_is_the_simplest(seed: int) -> None:
+    """By trial of one denominator after the other, in fractions, with the first stamp as rounded as all.
+
+    Where distances are equal as they are written, it is such a distance.
+    """
+    rng = np.random.default_rng(seed)
+    count, half = int(rng.integers(4, 9)), Fraction(1, 2000)
+    period = Fraction(int(rng.integers(30, 90)), int(rng.integers(900, 1100)))
+    t = [round(k * period, 3) for k in range(count)]
+    rows = range(1, count - 1)  # the last one may stand anywhere
+    low = max((t[k] - 2 * half) / k for k in rows)
+    high = min((t[k] + 2 * half) / k for k in rows)
+    simplest = (
+        t[1]
+        if len({t[k + 1] - t[k] for k in range(count - 2)}) == 1
+        else next(
+            Fraction(n, d)
+            for d in range(1, 3000)
+            for n in range(int(low * d), int(high * d) + 2)
+            if low <= Fraction(n, d) <= high
+        )
+    )
+    stamps = Stamps(float(half), 0.0)
+    stamps.taken(np.array([float(each) for each in t]))
+    assert stamps.lattice is not None
+    assert stamps.lattice.period == pytest.approx(float(simplest), rel=1e-12)
+
+
+@pytest.mark.parametrize("since", [0.0, 123.0, 1.7e9])
+@pytest.mark.parametrize("count", [3, 4, 10, 20, 100])
+@pytest.mark.parametrize("milliseconds", [7, 10, 12, 1])
+def test_whole_milliseconds_are_no_simpler_fraction_of_a_second(
+    milliseconds: int, count: int, since: float
+) -> None:
+    """Few rows that are written with three decimals leave room for 1/143 s, which nobody meant."""
+    t = since + np.array([round(k * milliseconds / 1000, 3) for k in range(count)])
+    stamps = Stamps(5e-4, 0.0)
+    times, exact = stamps.taken(t)
+    assert exact.all()
+    assert stamps.lattice is not None
+    assert stamps.lattice.period == pytest.approx(milliseconds / 1000, rel=1e-9 if since < 1e9 else 3e-4)
+    np.testing.assert_allclose(times, t, rtol=4e-16, atol=1e-15)

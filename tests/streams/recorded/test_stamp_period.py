@@ -52,6 +52,17 @@ def test_the_simplest_period_is_taken():
     assert found.deviation == pytest.approx(1e-6 / 3, rel=1e-3)
 
 
+@pytest.mark.parametrize("count", [3, 10, 30, 100])
+@pytest.mark.parametrize("milliseconds", [7, 10, 12, 40])
+def test_whole_milliseconds_are_no_simpler_fraction_of_a_second(milliseconds, count):
+    """Ten rows of 10 ms with three decimals leave room for 1/99 s, which nobody meant."""
+    stamps = np.round(np.arange(count) * milliseconds / 1000, 3)
+    found = fit_period(stamps, 0.5e-3)
+    assert found is not None
+    assert not found.snapped
+    np.testing.assert_allclose(found.times(0, count), stamps, rtol=1e-15, atol=1e-15)
+
+
 def test_stamps_on_a_grid_of_floats_are_not_snapped():
     for stamps in (np.arange(1000) / 1000, np.linspace(0.25, 7, 77), np.cumsum(np.full(50, 0.1))):
         found = fit_period(stamps, 0.0)

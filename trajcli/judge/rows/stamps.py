@@ -2,7 +2,7 @@
 
 Stamps that all lie within their rounding of multiples of one period are such multiples: 0.041667 s with six
 decimals is 1/24 s. The period is the simplest fraction, numerator and denominator smallest, that fits all of
-them.
+them; where their distances are equal as they are written, it is such a distance: 0.007 s is not 1/143 s.
 """
 
 from __future__ import annotations
@@ -108,9 +108,10 @@ def lattice_of(t: Array, errors: Array) -> Lattice | None:
     inner = t[:-1] if t.size > _FEW else t
     period = float(np.median(np.diff(inner)))
     errors = errors[: inner.size] + _SLACK * period
-    since, error = inner - t[0], 2.0 * float(errors.max())
-    if 4.0 * error > period and np.ptp(np.diff(inner)) <= _SLACK * period:  # equal as they are written
-        errors, error = np.full_like(errors, _SLACK * period), 2.0 * _SLACK * period
+    since, exact = inner - t[0], _SLACK * period + float(np.spacing(np.abs(inner).max()))
+    if np.ptp(np.diff(inner)) <= 2.0 * exact:  # equal as they are written: that is the period
+        errors = np.full_like(errors, exact)
+    error = 2.0 * float(errors.max())
     counted = max(0.2 * period / error, 1.0)  # up to here a guess that is off by rounding miscounts no row
     while True:
         steps = np.rint(since / period)

@@ -3,7 +3,7 @@
 Stamps lie on a grid of period h, each within its rounding r, where max(t_k - k h) - min(t_k - k h) <= 2 r.
 Only corners of the convex hull of the points (k, t_k) can be such a maximum or minimum, so these are all that
 is kept of a file of any length. The left side is convex in h; of all periods that fit the simplest fraction
-of seconds is taken, such as 1/24.
+of seconds is taken, such as 1/24. Stamps that lie on a grid as they are written are on that one.
 """
 
 from __future__ import annotations
@@ -79,6 +79,8 @@ class PeriodFit:
         best = _least(self._slope, mean - 2 * allowed, mean + 2 * allowed)
         if self._spread(best) > 2 * allowed:
             return None
+        if self._spread(best) <= 2 * noise:  # on a grid as they are written: no other one is meant
+            allowed = noise
         period = self._simplest(best, allowed)
         low, high = self._rest(period)
         start = _start(low, high, self._first, allowed)
