@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +14,13 @@ import trajcli
 from trajcli.api.plans import PlannedJob
 from trajcli.findings import Finding
 from trajcli.grids import UniformGrid
+from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.reconstruction import Interpolation
 from trajcli.judge.recorded_tool import judge_of_moves
 from trajcli.kinematics.forward import forward
 from trajcli.output.delivery.joined_rows import JoinedRows
+from trajcli.samples import sample
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 RADIUS = 0.05
@@ -151,3 +154,23 @@ def test_what_joins_rows_of_flown_lines_is_beside_them_outside_of_zones_alone(ra
     found = {each.move: each.value for each in judged.findings if each.kind == "deviation"}
     assert found == {move: pytest.approx(value, rel=1e-6) for move, value in wanted.items()}
     assert bool(wanted) is (rate < 10.0)
+
+
+@pytest.mark.parametrize("last", [True, False], ids=["behind", "before"])
+@pytest.mark.parametrize("inside", [0, 3, -1])
+def test_a_distance_that_does_not_stand_in_a_zone_is_found_in_its_row(
+    inside: int, last: bool, tmp_path: Path
+) -> None:
+    """Of the second line s is 50 mm in the zone before it, and 150 mm in the one behind it; one row says 2 mm more."""
+    plan, names, file = flown(), ["t", "q1", "q2", "q3", "s", "sd", "sdd", "move"], tmp_path / "rows.csv"
+    grid = UniformGrid(plan.trajectory.duration, 100.0)
+    (rows,) = sample(plan.trajectory, grid, ("t", "q", "path", "move"), robot=plan.loaded.robot)
+    in_zone = (rows[:, -1] == 1) & (rows[:, 5] == 0.0)
+    row = int(np.flatnonzero(in_zone & ((rows[:, 4] > 0.1) == last))[inside])
+    assert rows[row, 4] == pytest.approx(0.15 if last else 0.05, abs=1e-9)
+    rows[row, 4] += 2e-3
+    np.savetxt(file, rows, "%.9f", ",", header=",".join(names), comments="")
+    findings = check_file(str(file), CheckOptions(), plan).judgement.findings
+    (found,) = (each for each in findings if each.kind == "tool")
+    assert (found.quantity, found.row, found.move, found.count) == ("position", row + 1, 1, 1)
+    assert found.value == pytest.approx(2e-3, abs=1e-6)
