@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -106,22 +107,32 @@ def test_no_smaller_uniform_stretch_does_it(name: str) -> None:
         assert largest_share(slower, grid, 1e-4) > 1 + WITHIN
 
 
-def test_moves_that_are_said_to_be_over_a_limit_between_rows_are() -> None:
-    """By scipy's curves through the rows of the whole motion; one that is slow enough is not said to be over."""
-    loaded = load_job(str(EXAMPLES / "time_optimal.yaml"), ("when_over_limit=slow", "output.align=true"))
+def _said_to_be_over(name: str, factors: Sequence[float], none: Sequence[float]) -> int:
+    """Return how many of these stretches are said to be over; they are, by scipy's curves, and none of others is."""
+    loaded = load_job(str(EXAMPLES / f"{name}.yaml"), ("when_over_limit=slow", "output.align=true"))
     known: dict[Any, PlannedMove] = {}
     plan = plan_job(loaded, adapted=Adaptation(known=known))
-    rate = loaded.job.output.rate
     rows = JoinedRows(plan, grid_of(plan), ("t", "q", "qd", "qdd"), exact=True)
-    moves = StretchedMoves(rows, rate, known)
-    said = 0
-    for factor in few((1.0, 1.02, 1.05, 1.1, 1.2, 1.3), 3):
-        slower = plan_job(loaded, adapted=Adaptation(stretches=dict.fromkeys(range(3), factor), known=known))
+    moves, said = StretchedMoves(rows, loaded.job.output.rate, known), 0
+    for factor in factors:
+        stretches = dict.fromkeys(range(len(loaded.job.moves)), factor)
+        slower = plan_job(loaded, adapted=Adaptation(stretches=stretches, known=known))
         if moves.are_over(factor):
             assert largest_share(slower, grid_of(slower), 1e-4) > 1 + WITHIN
             said += 1
-    assert said >= 2
-    assert not any(map(moves.are_over, (1.3, 1.6)))
+    assert not any(map(moves.are_over, none))
+    return said
+
+
+def test_moves_that_are_said_to_be_over_a_limit_between_rows_are() -> None:
+    """By scipy's curves through the rows of the whole motion; one that is slow enough is not said to be over."""
+    assert _said_to_be_over("time_optimal", few((1.0, 1.02, 1.05, 1.1, 1.2, 1.3), 3), (1.3, 1.6)) >= 2
+
+
+@pytest.mark.full
+def test_moves_within_limits_of_efforts_are_said_to_be_over_as_well() -> None:
+    """They end at their next row where their efforts allow that, as the planned ones do."""
+    assert _said_to_be_over("two_tools", (1.0, 1.01, 1.02), (2.0,)) == 3
 
 
 @pytest.mark.full

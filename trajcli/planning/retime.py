@@ -282,6 +282,11 @@ def require_holdable(move: PlannedMove) -> None:
     )
 
 
+def next_periods(duration: float, rate: float) -> int:
+    """Return the least number of whole periods of `rate`, 1/s, that last `duration` seconds, at least one."""
+    return max(1, ceil(duration * rate - _WHOLE))
+
+
 def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
     """Return the move stretched to a whole number of periods; a move that keeps its limits goes on doing so.
 
@@ -290,7 +295,7 @@ def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
     """
     if move.duration == 0:
         return move
-    periods = max(1, ceil(move.duration * rate - _WHOLE))
+    periods = next_periods(move.duration, rate)
     # stretched from rest to rest, rates become less; of efforts nobody knows
     less = move.at_rest and not move.robot.limits.has_effort
     free = less or bool(over_limit(move))

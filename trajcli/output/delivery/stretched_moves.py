@@ -14,7 +14,7 @@ from trajcli.judge.reconstruction import piece_coefficients
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.adaptation import Adaptation
-from trajcli.planning.retime import align_to_period
+from trajcli.planning.retime import align_to_period, next_periods, over_limit, with_duration
 
 _STATED = {"linear": 1, "cubic": 2, "quintic": 3}  # of position, velocity and acceleration
 _SHARES = np.linspace(0.0, 1.0, 9)  # of an interval, at which its curve is looked at
@@ -41,37 +41,48 @@ class StretchedMoves:
         plan, first = rows.plan, Adaptation()
         moves = [known.get(first.key(move.index, move.start)) for move in plan.moves if move.duration > 0]
         fit = not plan.loaded.job.names_zones and rows.interpolation is not None
-        self._moves = [
-            move
-            for move in moves
-            if fit and move is not None and move.at_rest and not move.robot.limits.has_effort
-        ]
+        self._moves = [move for move in moves if fit and move is not None and move.at_rest]
         self._rate, self._interpolation = rate, rows.interpolation or "linear"  # without one no move fits
         self._followed = {move.index: other for move, other in pairwise(moves) if move is not None}
-        self._over: dict[tuple[int, int, int], bool] = {}
+        self._over, self._kept = dict[tuple[int, ...], bool](), dict[tuple[int, int], bool]()
 
     def are_over(self, factor: float) -> bool:
         """Return whether a move is certainly over a limit of a joint when all of them are so much longer."""
         adapted = Adaptation(stretches={move.index: factor for move in self._moves})
         try:
-            longer = {
-                move.index: align_to_period(
-                    adapted.stretched(move) if move.over_limit == "slow" else move, self._rate
-                )
+            stretched = {
+                move.index: adapted.stretched(move) if move.over_limit == "slow" else move
                 for move in self._moves
             }
+            longer = {index: self._to_next_row(move) for index, move in stretched.items()}
         except TrajcliError:
             return False
         for index, move in longer.items():
             other = self._followed.get(index)
             behind = None if other is None else longer.get(other.index)
-            rows = [0 if each is None else round(each.duration * self._rate) for each in (move, behind)]
-            key = index, rows[0], rows[1]
+            both = [each for each in (move, behind) if each is not None]
+            key = (index, *(round(each.duration * self._rate) for each in both))
             if key not in self._over:
                 self._over[key] = self._is_over(move, behind)
-            if self._over[key]:
+            if self._over[key] and all(self._ends_there(stretched[each.index], each) for each in both):
                 return True
         return False
+
+    def _to_next_row(self, move: PlannedMove) -> PlannedMove:
+        wanted = next_periods(move.duration, self._rate) / self._rate
+        return move if wanted == move.duration else with_duration(move, wanted)
+
+    def _ends_there(self, move: PlannedMove, longer: PlannedMove) -> bool:
+        """Return whether a move ends at its next row: within limits of efforts it may have to last longer."""
+        if not move.robot.limits.has_effort:
+            return True
+        key = move.index, round(longer.duration * self._rate)
+        if key not in self._kept:
+            self._kept[key] = not over_limit(longer)
+        try:
+            return self._kept[key] or align_to_period(move, self._rate).duration == longer.duration
+        except TrajcliError:
+            return False
 
     def _is_over(self, move: PlannedMove, behind: PlannedMove | None) -> bool:
         """Return whether the curve that joins rows is over a limit where a break of the planned one lies.
