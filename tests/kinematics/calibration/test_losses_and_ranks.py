@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from trajcli.kinematics.calibration import fit as fit_module
 from trajcli.kinematics.calibration.fit import Fit, Options, _cost
@@ -29,6 +30,17 @@ def test_weights_are_the_slope_of_a_loss_by_the_square_of_each_residual(loss: st
         assert cost <= size**2 * (1 + 1e-12)
         if size < 1e-2 * scale:
             assert cost == pytest.approx(size**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("loss", ["linear", "huber", "cauchy"])
+@pytest.mark.parametrize("scale", [0.1, 1.0, 30.0])
+def test_a_loss_is_that_of_scipy(loss: str, scale: float) -> None:
+    """Which halves the sum; without a loss the scale says nothing, and none need be given."""
+    sizes = np.array([1e-3, 0.05, 0.099, 0.101, 0.9, 1.1, 7.0, 29.0, 200.0])
+    peer = least_squares(lambda x: sizes + 0.0 * x[0], [0.0], loss=loss, f_scale=scale, max_nfev=1)
+    residuals = sizes[:, None] / np.sqrt(6.0) * np.ones(6)
+    for given in (scale, None) if loss == "linear" else (scale,):
+        assert _cost(residuals, loss, given)[0] == pytest.approx(2 * peer.cost, rel=1e-12)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("apart", "rank"), [(1e-3, 2), (1e-6, 2), (4e-8, 2), (4e-9, 1), (0.0, 1)])
