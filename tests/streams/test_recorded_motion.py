@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from trajcli.errors import InputError, TrajcliError
 from trajcli.streams import recorded_motion
+from trajcli.streams.recorded.column_roles import NamedFile
 from trajcli.streams.recorded_motion import open_motion
-from trajcli.streams.row_sources import ColumnExtents
+from trajcli.streams.row_sources import EXACT, ArrayRows, ColumnExtents, TimedRows, unplaced
 from trajcli.units import Units
 
 FILES = Path(__file__).parents[1] / "oracles" / "recorded"
@@ -518,3 +519,24 @@ def test_a_column_stands_where_it_does_so_in_all_blocks(size: int) -> None:
         extents.add(rows[low : low + size])
     assert extents.still.tolist() == [True, False, False, False, False]
     assert extents.largest.tolist() == [0.3, 0.3, 0.3, 0.4, 0.4]
+
+
+@pytest.mark.parametrize("size", [1, 2, 6])
+@pytest.mark.parametrize("taken", [[0, 1, 3], [0, 2], [2, 1], [1, 2, 3]])
+def test_rows_at_a_rate_have_their_times_in_front(taken: list[int], size: int) -> None:
+    """Six rows at 4 Hz, in blocks: the columns that are asked for, of which the time is the first."""
+    values = np.arange(18.0).reshape(6, 3) + 0.5
+
+    class InBlocks(ArrayRows):
+        def blocks(self, taken, fixed):
+            for low in range(0, 6, size):
+                yield self.columns[low : low + size, list(taken)]
+
+    named = NamedFile("rows", ("q1", "q2", "q3"), unplaced)
+    rows = InBlocks("csv", named, values, np.array([3, 4, 5]), np.array([0.0, 1e-8, 2e-8]))
+    timed = TimedRows(rows, 4.0)
+    assert timed.named.names == ("t", "q1", "q2", "q3")
+    whole = np.column_stack([np.arange(6) / 4.0, values])
+    np.testing.assert_array_equal(np.concatenate(list(timed.blocks(taken, []))), whole[:, taken])
+    assert timed.decimals(taken).tolist() == np.array([EXACT, 3, 4, 5])[taken].tolist()
+    assert timed.relative.tolist() == [0.0, 0.0, 1e-8, 2e-8]

@@ -59,3 +59,9 @@ def test_values_of_rows_are_those_of_the_arm_of_their_move(moves: list[int]) -> 
     np.testing.assert_allclose(poses, np.stack(wanted), atol=1e-13)
     of_first = found.values(len(moves), None, lambda arm, k: forward(arm, q[k]))
     np.testing.assert_allclose(of_first, forward(found.own, q), atol=1e-13)
+
+
+def test_no_rows_have_no_values() -> None:
+    """As in a block all of whose rows are left out."""
+    nothing = np.empty(0, dtype=np.int64)
+    assert arms().values(0, nothing, lambda arm, k: forward(arm, np.zeros((k.size, 6)))).size == 0
