@@ -125,3 +125,21 @@ def test_a_jump_of_the_next_move_is_not_a_missed_waypoint():
     unlimited = Limits(*(np.tile([-np.inf, np.inf], (2, 1)) for _ in range(4)))
     broken = verify(whole, [unlimited] * 2, [Promise(promise()), Promise()])
     assert {(finding.move, finding.kind) for finding in broken.findings} == {(1, "position_jump")}
+
+
+def test_of_each_move_that_misses_a_point_it_is_said():
+    whole = trajectory(passing(), between([0.5, -2.0], [2.0, 2.0]))
+    off = ViaPoints(np.array([2.0]), np.array([[2.0, 2.5]]), np.zeros((1, 2)))
+    found = check_waypoints(whole, [promise(points=POINTS + np.array([0.0, 0.1])), off])
+    assert [(finding.move, finding.joint) for finding in found] == [(0, "j2"), (1, "j2")]
+
+
+@pytest.mark.parametrize("together", [1, 2, 100])
+def test_each_point_has_its_own_distance(together, monkeypatch):
+    monkeypatch.setattr("trajcli.checks.via_points._BLOCK", together)
+    missed = np.array([[0.0, 0.3], [0.2, 0.0], [0.0, 0.1]])
+    assert check_waypoints(trajectory(passing()), [promise(points=POINTS - missed, missed=missed)]) == []
+    (found,) = check_waypoints(
+        trajectory(passing()), [promise(points=POINTS - missed, missed=missed[[0, 1, 0]])]
+    )
+    assert (found.joint, found.time, found.limit) == ("j2", 4.0, 0.3)

@@ -6,6 +6,7 @@ All motions are so simple that what a source explains is one product: rows at re
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,6 +66,7 @@ def test_both_rates_of_an_interval_may_be_rounded(share: float, broken: bool, or
         assert (found.kind, found.severity) == ("derivative", "error")
         assert found.value == pytest.approx(side * share * OFF, rel=1e-6)
         assert found.limit == pytest.approx(0.0, abs=1e-12)
+        assert found.rounding == pytest.approx(OFF, rel=0.01)  # and a thousandth of the peak, which is meant
 
 
 @SIDES
@@ -288,3 +290,154 @@ def test_few_rows_of_whole_milliseconds_are_no_contradiction(milliseconds: int, 
     t = np.round(np.arange(count) * milliseconds / 1000, 3)
     assert inconsistent(rows(np.sin(3 * t), 3 * np.cos(3 * t), t=t, late=5e-4)) == []
     assert inconsistent(rows(np.sin(3 * t), 3.03 * np.cos(3 * t), t=t, late=5e-4))
+
+
+@SIDES
+def test_one_distant_row_excuses_no_dense_ones(side: int) -> None:
+    """Velocities that are a twentieth too large, and limits that allow anything from the last row but one to the last."""
+    t = np.append(DENSE, DENSE[-1] + 0.5)
+    wide = replace(unlimited(1), acceleration=np.array([[-10.0, 10.0]]))
+    found = inconsistent(rows(side * t, np.full(t.size, side * 1.05), t=t), wide)
+    assert [(each.kind, each.quantity) for each in found] == [("derivative", "velocity")]
+
+
+def test_rounding_counts_between_distant_rows_of_an_arm_with_hardly_any_limits() -> None:
+    t, off = 0.5 * np.arange(12.0), 0.9 * OFF * (-1.0) ** np.arange(12)
+    hardly = replace(unlimited(1), acceleration=np.array([[-1e-7, 1e-7]]))
+    assert inconsistent(rows(off, np.zeros(12), t=t, q=OFF), hardly) == []
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.99, False), (1.02, True)])
+def test_rows_at_20_hertz_are_distant(share: float, broken: bool, side: int) -> None:
+    t, far = 0.05 * np.arange(12.0), 2.0 * 0.05**2 / 4
+    q = side * share * far * np.where(np.arange(12) > 2, 1.0, 0.0)
+    limits = replace(unlimited(1), acceleration=np.array([[-1.0, 2.0]]))
+    assert bool(inconsistent(rows(q, np.zeros(12), t=t), limits)) == broken
+
+
+@SIDES
+@pytest.mark.parametrize("other", [[-1e3, 1e3], [-np.inf, np.inf]])
+@pytest.mark.parametrize(
+    ("own", "jumps"), [([-1e3, 1e3], False), ([-np.inf, 1e3], True), ([-1e3, np.inf], True)]
+)
+def test_a_velocity_jumps_where_no_limit_says_how_fast_it_may_change(
+    own: list[float], jumps: bool, other: list[float], side: int
+) -> None:
+    """By 1 rad/s between two rows, which state no acceleration; within its limits it might be anything."""
+    qd = np.zeros((COUNT, 2))
+    qd[12:, 0] = side * 1.0
+    q = np.vstack([np.zeros((1, 2)), np.cumsum(0.5 * (qd[1:] + qd[:-1]) * np.diff(DENSE)[:, None], axis=0)])
+    limits = replace(unlimited(2), acceleration=np.array([own, other]))
+    found = inconsistent(rows(q, qd, 0 * qd), limits)
+    assert [(each.kind, each.quantity, each.row) for each in found] == [("jump", "velocity", 12)] * jumps
+
+
+@SIDES
+def test_a_position_jumps_whatever_limits_of_acceleration_say(side: int) -> None:
+    q = np.where(np.arange(COUNT) < 12, 0.0, side * 1e-3)
+    limits = replace(unlimited(1), acceleration=np.array([[-1e3, 1e3]]))
+    found = inconsistent(rows(q, np.zeros(COUNT)), limits)
+    assert [(each.kind, each.quantity, each.row) for each in found] == [("jump", "position", 12)]
+
+
+@pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])
+def test_values_in_single_precision_are_rounded_by_a_share_of_each(share: float, broken: bool) -> None:
+    """At 100 rad by 6e-6 in turns, up and down; the rate is zero throughout."""
+    q = 100.0 * (1.0 + share * 2.0**-24 * (-1.0) ** np.arange(COUNT))
+    motion = rows(q, np.zeros(COUNT))
+    motion = replace(motion, resolution=replace(motion.resolution, relative=2.0**-24))
+    assert [each.kind for each in inconsistent(motion)] == (["derivative"] if broken else [])
+
+
+@pytest.mark.parametrize(("off", "broken"), [(0.45e-12, False), (0.7e-12, True)])
+def test_a_joint_that_rests_may_be_off_by_a_picoradian(off: float, broken: bool) -> None:
+    q = off * (-1.0) ** np.arange(COUNT)
+    assert [each.kind for each in inconsistent(rows(q, np.zeros(COUNT)))] == (
+        ["derivative"] if broken else []
+    )
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.9e-3, False), (1.4e-3, True)])
+def test_of_a_column_its_peak_counts_not_where_it_is_slow(share: float, broken: bool, side: int) -> None:
+    """From rest to 1 rad/s at one acceleration; the column is off by a thousandth of that everywhere."""
+    rate = DENSE / DENSE[-1]
+    q = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(DENSE)))
+    found = inconsistent(rows(side * q, side * (rate + share)))
+    assert [each.kind for each in found] == (["derivative"] if broken else [])
+
+
+def moved_by(qd: np.ndarray) -> np.ndarray:
+    """Return positions that go with velocities."""
+    return np.append(0.0, np.cumsum(0.5 * (qd[1:] + qd[:-1]) * np.diff(DENSE)))
+
+
+@SIDES
+def test_a_velocity_that_steps_within_its_limits_beside_wrong_accelerations_does_not_jump(side: int) -> None:
+    """The column of accelerations says 30 throughout: it is that column which is wrong, in all intervals."""
+    qd = np.where(np.arange(COUNT) < 12, 0.0, side * 0.1)
+    limits = replace(unlimited(1), acceleration=np.array([[-1e3, 1e3]]))
+    found = inconsistent(rows(moved_by(qd), qd, np.full(COUNT, side * 30.0)), limits)
+    assert [(each.kind, each.quantity) for each in found] == [("derivative", "acceleration")]
+
+
+@SIDES
+def test_beside_an_acceleration_of_one_row_a_velocity_that_hardly_changes_does_not_jump(side: int) -> None:
+    qd, qdd = np.where(np.arange(COUNT) < 12, 0.0, side * 1e-6), np.zeros(COUNT)
+    qdd[12] = side * 50.0
+    assert [each.kind for each in inconsistent(rows(moved_by(qd), qd, qdd))] == []
+
+
+@SIDES
+@pytest.mark.parametrize(("rate", "jumps"), [(0.0, True), (9.0, False)])
+def test_a_step_of_a_position_that_its_velocity_says_is_no_jump(rate: float, jumps: bool, side: int) -> None:
+    """It is over the limit of velocity, and the velocity in the row behind it says even more."""
+    q, qd = np.where(np.arange(COUNT) < 12, 0.0, side * 1e-2), np.zeros(COUNT)
+    qd[12] = side * rate
+    limits = replace(unlimited(1), velocity=np.array([[-0.5, 0.5]]))
+    assert [each.kind for each in inconsistent(rows(q, qd), limits)] == ["jump"] * jumps
+
+
+@SIDES
+def test_of_jumps_in_both_directions_the_larger_one_is_named(side: int) -> None:
+    q = np.zeros(COUNT)
+    q[6:], q[16:] = side * 1e-3, -side * 1e-3
+    (found,) = inconsistent(rows(q, np.zeros(COUNT)))
+    assert (found.kind, found.row, found.count) == ("jump", 16, 2)
+    assert found.value == pytest.approx(-side * 2e-3)
+
+
+class _KnownTool:
+    """A tool that jumps where the joint jumps downwards, and notes what it is asked."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+        self.asked: list[tuple[list[float], int]] = []
+
+    def see(self, *_: object, **__: object) -> None:
+        pass
+
+    def findings(self) -> list[Finding]:
+        return []
+
+    def changes_branch(self, q: np.ndarray, jump: int) -> bool:
+        self.asked.append((q[:, 0].tolist(), jump))
+        return bool(q[jump + 1, 0] > q[jump, 0])
+
+
+@pytest.mark.parametrize("first", [1, 2, 8])
+def test_where_the_tool_does_not_jump_with_a_joint_it_is_the_branch_that_changes(first: int) -> None:
+    """The row before the jump and the one behind it are compared with those beside them."""
+    q = 1e-4 * np.arange(float(COUNT))
+    q[first:] += 1.0
+    q[16:] -= 0.7
+    tool = _KnownTool()
+    motion = rows(q, np.gradient(1e-4 * np.arange(COUNT), DENSE))
+    known: Any = tool
+    judged = judge_motion(lambda: [motion], Requirements(bare_robot(unlimited(1)), tool=lambda: known))
+    found = [(each.kind, each.row) for each in judged.findings if each.kind in ("jump", "branch")]
+    assert sorted(found) == [("branch", first), ("jump", 16)]
+    low = max(first - 2, 0)
+    assert (q[low : first + 2].tolist(), first - 1 - low) in tool.asked
+    assert (q[14:18].tolist(), 1) in tool.asked

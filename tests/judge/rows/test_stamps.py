@@ -257,3 +257,23 @@ def test_whole_milliseconds_are_no_simpler_fraction_of_a_second(
     assert stamps.lattice is not None
     assert stamps.lattice.period == pytest.approx(milliseconds / 1000, rel=1e-9 if since < 1e9 else 3e-4)
     np.testing.assert_allclose(times, t, rtol=4e-16, atol=1e-15)
+
+
+def test_behind_a_stamp_beside_its_multiple_nothing_follows() -> None:
+    """What ended a block by itself was the end of the motion; where rows go on, it does not fit."""
+    t = written(Fraction(1, 100), 4, 0, 100)
+    t[49] += 2e-3
+    stamps = Stamps(5e-5, 0.0)
+    assert stamps.taken(t[:50])[1].tolist() == [True] * 49 + [False]
+    with pytest.raises(UnfitError):
+        stamps.taken(t[50:])
+
+
+@pytest.mark.parametrize("late", [0.8, -0.8])
+def test_the_largest_move_of_a_stamp_is_remembered_either_way(late: float) -> None:
+    """One stamp is off by its rounding, in the first block; in the second one none is."""
+    half, t = 5e-9, 0.01 * np.arange(100)
+    t[20] += late * half
+    stamps = Stamps(half, 0.0)
+    assert in_blocks(stamps, t, [50])[1].all()
+    assert stamps.largest_snap == pytest.approx(abs(late) * half, rel=1e-3)

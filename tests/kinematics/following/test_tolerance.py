@@ -18,6 +18,7 @@ from trajcli.kinematics.following.tolerance import (
     Tolerance,
     ToleranceRatio,
     _by_kind,
+    _floored,
     probes,
     tolerance_ratio,
 )
@@ -154,3 +155,27 @@ def test_what_the_tool_does_not_do_is_measured_by_what_it_does(turning):
     measure = tolerance_ratio(arm, Tolerance(), path.breaks, coarse.evaluate(probes(path.breaks)))
     wanted = [0.1 * length, 1.0] if turning else [1.0, 0.1 / length]
     np.testing.assert_allclose(measure.tool_peaks[0], wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("breaks", [[0.0, 1.0], [0.5, 1.0, 3.0], np.linspace(2.0, 4.0, 40)])
+def test_peaks_are_looked_for_inside_of_all_segments(breaks):
+    """As often in each, at the same places seen from either end of it."""
+    breaks = np.asarray(breaks)
+    count = breaks.size - 1
+    shares = (probes(breaks).reshape(count, -1) - breaks[:-1, None]) / np.diff(breaks)[:, None]
+    assert shares.size >= 33
+    assert (np.diff(shares, axis=1) > 0).all()
+    assert ((shares > 0) & (shares < 1)).all()
+    np.testing.assert_allclose(shares, 1 - shares[:, ::-1], atol=1e-12)
+    np.testing.assert_allclose(shares, np.tile(shares[0], (count, 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("duration", [0.5, 20.0])
+def test_what_hardly_moves_is_measured_by_a_thousandth_of_what_does(duration):
+    """An acceleration at least by what gets to that speed in the whole of the time; at rest a micrometre counts."""
+    speeds, rates = _floored(np.array([[10.0, 1e-9], [0.0, 7.0]]), duration)
+    np.testing.assert_allclose(speeds, [10.0, 1e-2])
+    np.testing.assert_allclose(rates, [10.0 / duration, 7.0])
+    speeds, rates = _floored(np.zeros((2, 2)), duration)
+    np.testing.assert_allclose(speeds, 1e-6 / duration)
+    np.testing.assert_allclose(rates, 1e-6 / duration**2)
