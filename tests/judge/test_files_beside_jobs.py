@@ -88,6 +88,43 @@ def test_rows_that_last_longer_or_shorter_are_of_no_move(stretch: float, tmp_pat
     assert any("no column `move`" in note for note in judgement.notes)
 
 
+@pytest.mark.parametrize("stretch", [1.0, 2.0, 0.9])
+def test_rows_of_a_job_of_one_move_are_of_that_whatever_they_last(stretch: float, tmp_path: Path) -> None:
+    job = ONE_MOVE.replace("PLANNER", "quintic").replace("END", "0.5").replace("ACCELERATION", "90")
+    rows = rows_of(quintic, 0.5)
+    rows[:, 0] *= stretch
+    slow = job.replace("duration: 1}", "duration: 1, limits: {velocity: 0.5}}")
+    judgement = judged(tmp_path, slow, rows[:, :3], "t,q1,q2")
+    assert [each.move for each in judgement.findings if each.kind == "velocity"] == [0]
+    assert not any("no column `move`" in note for note in judgement.notes)
+
+
+@pytest.mark.parametrize(("late", "named"), [(4e-7, True), (-4e-7, True), (3e-6, False)])
+def test_a_file_lasts_as_long_as_the_plan_within_a_microsecond(
+    late: float, named: bool, tmp_path: Path
+) -> None:
+    rows = two_moves(1.2, 1.08)
+    rows[-1, 0] += late
+    notes = judged(tmp_path, TWO_MOVES, rows, NAMES).notes
+    assert any("no column `move`" in note for note in notes) is not named
+
+
+@pytest.mark.parametrize(("step", "over"), [(0.025, True), (0.015, False)])
+def test_a_row_where_a_move_begins_is_of_that_move_as_far_as_its_stamp_says(
+    step: float, over: bool, tmp_path: Path
+) -> None:
+    """The second move begins at 1.0003 s, and the row of that time says 1.000: from there on 2 rad/s are allowed."""
+    job = TWO_MOVES.replace("[1, 0]}, duration: 1}", "[1, 0]}, duration: 1.0003}")
+    (tmp_path / "job.yaml").write_text(job)
+    q = np.where(np.arange(201) > 100, step, 0.0)
+    lines = [f"{0.01 * k:.3f},0.0,{each:.9f}" for k, each in enumerate(q.tolist())]
+    (tmp_path / "rows.csv").write_text("\n".join(["t,q1,q2", *lines]) + "\n")
+    judgement = check_file(str(tmp_path / "rows.csv"), CheckOptions(job=str(tmp_path / "job.yaml"))).judgement
+    assert not any("no column `move`" in note for note in judgement.notes)
+    found = [(each.joint, each.move) for each in judgement.findings if each.kind == "velocity"]
+    assert found == ([("j2", 1)] if over else [])
+
+
 @pytest.mark.parametrize(
     ("tolerance", "allowed"), [(None, 1e-3), ("0.02", 0.02), ("1 deg", np.pi / 180), ("0", 0.0)]
 )
