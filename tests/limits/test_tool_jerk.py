@@ -187,7 +187,8 @@ def test_on_a_path_the_whole_vector_counts(planner: str, shape: str, key: str) -
     assert share <= 1 + 2e-4
     if planner == "path" and key == "jerk":
         assert share > 1 - 1e-6
-        assert [event.kind for event in plan.events] == ["stretched"]
+        keeps_it = shape == "time_optimal"  # the law itself, which needs no stretch of the whole
+        assert [event.kind for event in plan.events] == ([] if keeps_it else ["stretched"])
 
 
 @pytest.mark.parametrize("key", THIRD)
