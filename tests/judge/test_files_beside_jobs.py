@@ -264,6 +264,22 @@ def test_options_that_exclude_each_other_or_lack_what_they_are_about_are_refused
         beside_arm(tmp_path, "t,q1\n0,0\n1,1\n", start_tolerance="0.1")
     with pytest.raises(InputError, match="judged by"):
         beside_arm(tmp_path, "t,q1\n0,0\n1,1\n", robot=None)
+    with pytest.raises(InputError, match="overrides values of a job, and there is none"):
+        beside_arm(tmp_path, "t,q1\n0,0\n1,1\n", override=("limits.velocity=1",))
+
+
+@pytest.mark.parametrize(("units", "limit"), [(None, 30.0), ("deg", np.pi / 6)])
+def test_limits_beside_an_arm_have_the_units_that_are_said(
+    units: str | None, limit: float, tmp_path: Path
+) -> None:
+    """As in a job in rad, unless somebody says others; 30 rad/s are more than the sheet of the arm allows."""
+    (tmp_path / "limits.yaml").write_text("velocity: 30\n")
+    (tmp_path / "rows.csv").write_text("t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1,1,0,0,0,0,0\n2,100,0,0,0,0,0\n")
+    options = CheckOptions(robot="ur5e", limits=str(tmp_path / "limits.yaml"), units=units)
+    checked = check_file(str(tmp_path / "rows.csv"), options)
+    np.testing.assert_allclose(checked.robot.limits.velocity[:, 1], limit)
+    assert bool(checked.judgement.events) is (units is None)
+    assert checked.units.angle == (units or "rad")
 
 
 SHORT = "{planner: trapezoid, to: {joints: [0.4, 0]}, duration: 0.01}"

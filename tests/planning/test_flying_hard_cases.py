@@ -153,6 +153,18 @@ def test_a_move_that_stops_at_corners_of_its_own_is_flown_by_at_its_ends(limits)
     np.testing.assert_allclose(state, [[0.8, 1.5], [0, 0]], atol=1e-7)
 
 
+def test_of_points_in_zones_a_flown_move_promises_nothing():
+    """The first one and the last one are nearer to the corners than their zones reach; those between are passed."""
+    inner = np.array([[0.605, 1.302], [0.8, 1.5], [0.9, 1.45], [0.998, 1.303]])
+    through = {**POLYLINE, "path": "spline", "through": [{"joints": point} for point in inner.tolist()]}
+    plan = planned(to(0.6, 1.3), through, to(1.2, 2.0), limits=JERKLESS)
+    assert [zone.move for zone in plan.flyby.zones] == [0, 1]
+    passed = plan.moves[1].planned.via_points
+    np.testing.assert_allclose(passed.points, inner[1:3])
+    times = plan.trajectory.spans[1].start + passed.times
+    np.testing.assert_allclose(plan.trajectory.curve.evaluate(times), inner[1:3], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     "stop", few([{"corner": "stop"}, {"radius": 0.02}], 1), ids=few(["corner", "radius"], 1)
 )
