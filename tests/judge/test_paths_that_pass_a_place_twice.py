@@ -80,8 +80,15 @@ def deviations(
     return [each for each in found if each.kind == "deviation"]
 
 
-@pytest.mark.parametrize("offset", [0.05, 0.35, 0.5, 0.65, 0.95])
-@pytest.mark.parametrize("spacing", [0.025, 0.011, 0.002])
+@pytest.mark.parametrize(
+    ("spacing", "offset"),
+    [
+        *((0.025, offset) for offset in (0.05, 0.35, 0.5, 0.65, 0.95)),
+        (0.011, 0.35),
+        (0.011, 0.65),
+        (0.002, 0.35),
+    ],
+)
 def test_a_way_forth_and_back_is_gone_to_its_end(spacing: float, offset: float) -> None:
     """However the rows fall about the turn, and however far they are apart: what is behind the way back counts."""
     s = np.arange(0.3 - (int(0.3 / spacing) + offset - 1) * spacing, 0.8, spacing)
@@ -104,8 +111,7 @@ def test_a_leap_to_another_side_of_a_rectangle_is_found() -> None:
     assert [(each.row, each.value) for each in found] == [(41, pytest.approx(0.5 - reach, abs=1.1e-2))]
 
 
-@pytest.mark.parametrize("standing", [0, 1, 3])
-@pytest.mark.parametrize("before", [0.0, 1e-6, 0.2e-4, 0.4e-4, 0.8e-4])
+@pytest.mark.parametrize(("standing", "before"), [(0, 0.0), (3, 0.0), (1, 1e-6), (1, 0.4e-4), (3, 0.8e-4)])
 def test_a_loop_that_is_shorter_than_its_reach_is_gone_around(before: float, standing: int) -> None:
     """Where it crosses itself the first time the tool goes straight on, also after it stood right there."""
     s = np.arange(0.05 - before - 100 * 3e-4, 0.09, 3e-4)
@@ -140,7 +146,7 @@ def test_dense_rows_get_from_place_to_place(spacing: float) -> None:
     assert deviations(LINE, along(LINE, s), period=1e-4) == []
 
 
-@pytest.mark.parametrize("offset", [0.1, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize("offset", [0.1, 0.3, 0.7, 0.9])
 def test_a_way_back_beside_the_way_there_is_told_from_it_by_where_it_is(offset: float) -> None:
     """It is 0.3 mm away, half of how far apart the places are at which the path is looked at first."""
     s = np.arange(offset * 3e-3, 0.6003, 3e-3)

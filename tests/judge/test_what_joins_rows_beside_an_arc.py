@@ -154,8 +154,7 @@ def of_plan(plan: PlannedJob, rate: float, *, exact: bool = True) -> list[Findin
     return sorted(found, key=lambda each: each.move or 0)
 
 
-@pytest.mark.parametrize("duration", [0.3, 0.1, 0.7])
-@pytest.mark.parametrize("arcs", [1, 3, 4])
+@pytest.mark.parametrize(("arcs", "duration"), [(1, 0.3), (4, 0.1), (4, 0.7)])
 def test_rows_at_ends_of_planned_moves_belong_to_both(arcs: int, duration: float) -> None:
     """Three rows each: the two chords of every move count, whatever rounding makes of the ends of moves."""
     for pieces in (1, 2):
