@@ -159,3 +159,23 @@ def test_with_jerk_it_is_not_above_the_motion_of_ruckig(
     chain = chain_of(slopes, 0.1, (first, last), jerk=jerk, sign=-1.0 if at_end else 1.0)
     bound = second_order_duration(chain, 1.4 * exact)
     assert near * exact <= bound <= exact
+
+
+def test_a_border_that_rounding_leaves_without_states_ends_the_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The least of all ways is the same at every border, but for rounding: what it made of the first look stands."""
+    from trajcli.planners.flying_by import second_order
+
+    chain = chain_of([Polynomial([1.0]), Polynomial([1.0])], 0.2)
+    sums, looks = second_order.least_sums, list[int]()
+
+    def rounded(lasting: list[Array]) -> Any:
+        looks.append(len(lasting))
+        before, behind = sums(lasting)
+        return before, [rows + (k == 1) * 1e9 for k, rows in enumerate(behind)]
+
+    bound = second_order_duration(chain, 10.0)
+    monkeypatch.setattr(second_order, "least_sums", rounded)
+    assert 0.5 * bound < second_order_duration(chain, 10.0) <= bound
+    assert len(looks) == 1

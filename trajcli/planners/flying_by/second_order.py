@@ -67,6 +67,8 @@ def second_order_duration(chain: FlyByChain, duration: float) -> float:
         if least >= duration:
             break
         kept = [rows[values < duration] for rows, values in zip(borders, through, strict=True)]
+        if not all(map(len, kept)):  # the sums of one border are rounded otherwise than those of another
+            break
         borders = [kept[0], *(_halved(rows, _INTERVALS) for rows in kept[1:-1]), kept[-1]]
     return rounded_down(least)
 
