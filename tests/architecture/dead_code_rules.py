@@ -23,7 +23,6 @@ HOOKS = {
         "called by toppra, whose paths have them": "dof path_interval",
         "read of the user's file by its name, as a way to write an orientation": "quat_wxyz quat_xyzw rotvec axis_angle",
         "the key of the move itself, which has nothing in it": "detach",
-        "read by the name that the kind of limit has in its table": "angular_jerk",
         "read by the name of its column": "qddd",
         "taken by position where the phases are made": "jerking accelerating",
         "numbers of a report, for its reader": "in_pi gravity_share trajcli",
