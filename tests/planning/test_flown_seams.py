@@ -98,6 +98,36 @@ def test_the_report_of_the_tool_is_that_of_its_path_between_zones():
         assert move.tool.method == "bounded"
 
 
+@pytest.mark.full
+def test_a_wanted_speed_is_held_on_so_much_of_a_path_between_zones_and_explained_with_its_law(
+    tmp_path: Path, capfd, monkeypatch
+):
+    """By the speed of the tool by the textbook; in a zone none is held."""
+    share_plans(monkeypatch)
+    paced = {**LINES, "moves": [{**move, "law": {**FAST["law"], "speed": 0.2}} for move in LINES["moves"]]}
+    plan, job = plan_job(job_from_text(json.dumps(paced))), tmp_path / "paced.yaml"
+    (zone,) = plan.flyby.zones
+    job.write_text(json.dumps(paced))
+    explained = json.loads(call(capfd, "explain", job, "--json").out)["moves"]
+    ends = (0.0, zone.entered), (zone.left, plan.trajectory.duration)
+    for move, begin, (first, last) in zip(explained, (place(np.array(START)), CORNER), ends, strict=True):
+        times = np.linspace(first, last, 20001)
+        q, qd = (plan.trajectory.curve.evaluate(times, order) for order in (0, 1))
+        speeds = speed(q, qd)
+        fast = speeds[speeds >= 0.999 * 0.2].sum() * (times[1] - times[0])
+        assert move["tool"]["wanted_speed"] == 0.2
+        assert 0.2 < move["tool"]["held"] == pytest.approx(fast / move["path"]["length"], abs=5e-3)
+        law, since = move["path"]["law"], times - move["start"]
+        assert law[0]["start"] == 0
+        assert law[-1]["end"] == pytest.approx(move["duration"], abs=1e-9)
+        pieces = np.searchsorted([piece["end"] for piece in law[:-1]], since)
+        s = [np.polyval(law[k]["absolute"][::-1], time) for k, time in zip(pieces, since, strict=True)]
+        assert np.abs(np.linalg.norm(place(q) - begin, axis=1) - s).max() < 1e-6
+    text = call(capfd, "explain", job).out
+    assert text.count("tool speed of 0.2 m/s held on") == 2
+    assert text.count("line from") == 2
+
+
 def test_rows_of_another_motion_are_compared_with_the_path_outside_of_zones(
     tmp_path: Path, capfd, monkeypatch
 ):

@@ -35,6 +35,7 @@ from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals
 from trajcli.output.report import report_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
+from trajcli.planning.planned_move import law_of_path, path_of_tool
 from trajcli.units import Quantity, Units, factor, joint_units
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def _move(plan: Plan, index: int, report: MoveReport, *, derivatives: bool) -> E
     """Return what there is to say about a move."""
     move, units = plan.moves[index], plan.loaded.units
     names, planned = move.robot.joint_names, move.planned
-    arrivals, tool = planned.arrivals, planned.tool
+    arrivals, tool = planned.arrivals, path_of_tool(move)
     own = {
         "joints": list(names),
         "from_pose": _pose(plan, None) if index == 0 else None,
@@ -109,7 +110,7 @@ def _move(plan: Plan, index: int, report: MoveReport, *, derivatives: bool) -> E
         and tuple(
             ExplainedOutside(**{**one.__dict__, "time": one.time - report.start}) for one in report.outside
         ),
-        "path": None if tool is None else _path(tool, units, derivatives=derivatives),
+        "path": None if tool is None else _path(move, tool, units, derivatives=derivatives),
     }
     return ExplainedMove(**{**report.__dict__, **own})
 
@@ -198,18 +199,18 @@ def _resolved(pose: ResolvedPose, plan: Plan, robot: Robot) -> PoseReport:
     )
 
 
-def _path(tool: ToolMotion, units: Units, *, derivatives: bool) -> PathReport:
+def _path(move: PlannedMove, tool: ToolMotion, units: Units, *, derivatives: bool) -> PathReport:
     segments, corners = _drawing(tool)
-    length = float(tool.law.piece_ends()[1][-1, 0])
+    law = law_of_path(move, tool)
     unit = "rad" if tool.pure_rotation else "m"
     report = PathReport(
-        length=length, unit=unit, segments=segments, corners=corners, weave=_weave(tool), law=[]
+        length=tool.length, unit=unit, segments=segments, corners=corners, weave=_weave(tool), law=[]
     )
     path = in_units(report, units)
     scale = factor(Quantity("angle" if tool.pure_rotation else "length"), units)
-    coefficients = tool.law.coefficients[:, :, 0] / scale
-    law = polynomial_intervals(tool.law.breaks, coefficients, path.unit, derivatives=derivatives)
-    return path.model_copy(update={"law": law})
+    coefficients = law.coefficients[:, :, 0] / scale
+    pieces = polynomial_intervals(law.breaks, coefficients, path.unit, derivatives=derivatives)
+    return path.model_copy(update={"law": pieces})
 
 
 def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]:

@@ -12,7 +12,6 @@ import numpy as np
 from trajcli.checks.continuity import AccelerationSteps
 from trajcli.checks.verify import Verdict
 from trajcli.curves.extrema import Peaks
-from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.job.report import (
@@ -330,9 +329,9 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
     bounds = [None if bound is None else bound.upper_bound for bound in tool.bounds]
     unit = "rad" if motion.pure_rotation else "m"
     wanted = move.planned.wanted_speed
-    held, lowest = (None, None) if wanted is None else _held(move, motion.law, wanted, unit)
+    held, lowest = (None, None) if wanted is None else _held(move, motion, wanted, unit)
     return ToolReport(
-        length=_length(motion),
+        length=motion.length,
         unit=unit,
         ruled_by=motion.ruled_by,
         wanted_speed=wanted,
@@ -347,12 +346,6 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
         turned_bound=bounds[1],
         method="sampled" if None in bounds else "bounded",
     )
-
-
-def _length(motion: ToolMotion) -> float:
-    """Return the length of the path of a tool: beside a zone its law is that of a part."""
-    path = motion.path
-    return float(motion.law.piece_ends()[1][-1, 0]) if path is None else path.length
 
 
 def _segments(run: SpeedRun, span: Span) -> SegmentSpeedsReport:
@@ -394,15 +387,16 @@ def _tool_peak(kind: LimitKind, peak: ToolPeak, limit: float, span: Span) -> Too
 
 
 def _held(
-    move: PlannedMove, law: PiecewisePolynomial, wanted: float, unit: str
+    move: PlannedMove, motion: ToolMotion, wanted: float, unit: str
 ) -> tuple[float, LowestSpeedReport | None]:
     """Return over which part of the path the wanted speed is held, and where it is lowest in between."""
+    law = motion.law
     part = np.linspace(0.0, 1.0, _EACH + 1)[:-1]
     times = np.append((law.breaks[:-1, None] + law.lengths[:, None] * part).reshape(-1), law.end)
     s, speeds = law.evaluate_orders(times, (0, 1))[:, :, 0].T
     fast = speeds >= _HELD * wanted
     both = fast[1:] & fast[:-1]
-    held = float(np.diff(s)[both].sum() / s[-1])
+    held = float(np.diff(s)[both].sum() / motion.length)
     if not fast.any():
         return held, None
     first, last = int(fast.argmax()), int(fast.size - 1 - fast[::-1].argmax())

@@ -93,13 +93,17 @@ def path_of_tool(move: PlannedMove) -> ToolMotion | None:
 
 
 def law_of_tool(move: PlannedMove) -> PiecewisePolynomial | None:
-    """Return the time law s(t) of the tool along its path; while it turns in its place it has none.
+    """Return the time law s(t) of the tool along its path; while it turns in its place it has none."""
+    tool = path_of_tool(move)
+    return None if tool is None or tool.pure_rotation else law_of_path(move, tool)
+
+
+def law_of_path(move: PlannedMove, tool: ToolMotion) -> PiecewisePolynomial:
+    """Return the time law s(t) of a move whose tool follows its path as `tool` says, m or rad.
 
     In a zone, where the tool has no path, s stays as it is on its border.
     """
-    tool, parts = path_of_tool(move), move.planned.parts
-    if tool is None or tool.pure_rotation:
-        return None
+    parts = move.planned.parts
     if not parts:
         return tool.law
     (first, *_), (*_, last) = (ends[:, 0].tolist() for ends in tool.law.piece_ends())

@@ -7,6 +7,7 @@ import pytest
 from tiers import few
 from tool_jobs import LEFT, planned
 
+from trajcli.kinematics.following.follower import Follower
 from trajcli.kinematics.jacobian import tcp_twist
 
 LIMITS = {"velocity": 50.0, "acceleration": 2000.0, "jerk": None}
@@ -47,6 +48,34 @@ def test_free_orientation_of_a_small_arm(shape):
     made = planned(robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": tcp})
     assert not made.verdict.findings
     assert 0.4 < turning(made) <= 0.5 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("limit", ["angular_speed", "angular_acceleration"])
+def test_one_limit_of_turning_is_enough_for_a_free_turn_to_count(limit):
+    """A time-optimal law uses all of it, and 0.6 of an acceleration that is not along its axis alone."""
+    joint = {"a": 0.5}
+    robot = {"name": "planar", "convention": "standard", "joints": [joint, joint]}
+    move = {"planner": "line", "to": {"xyz": [0.1, 0.6, 0]}, "law": {"shape": "time_optimal"}}
+    made = planned(robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": {limit: 0.4}})
+    assert not made.verdict.findings
+    times = np.linspace(0, made.trajectory.duration, 20001)
+    rates = made.trajectory.curve.evaluate(times, 1 if limit == "angular_speed" else 2)
+    assert 0.5 * 0.4 < np.abs(rates.sum(axis=1)).max() <= 0.4 * (1 + 1e-6)
+
+
+def test_joints_are_not_found_anew_for_a_turn_that_nothing_limits(monkeypatch):
+    """Laws ask for rows at thousands of places; each would take steps of Newton."""
+    asked = []
+    found = Follower.joint_state
+    monkeypatch.setattr(Follower, "joint_state", lambda *args: asked.append(args) or found(*args))
+    move = {"planner": "line", "to": {"xyz": [0.1, 0.6, 0]}, "law": {"shape": "time_optimal"}}
+    robot = {"name": "planar", "convention": "standard", "joints": [{"a": 0.5}, {"a": 0.5}]}
+    counts = []
+    for tcp in ({"speed": 0.4}, {"speed": 0.4, "angular_speed": 1e6}):
+        asked.clear()
+        planned(robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": tcp})
+        counts.append(len(asked))
+    assert 2 * counts[0] < counts[1]
 
 
 def test_without_a_limit_of_turning_the_law_is_that_of_the_position():

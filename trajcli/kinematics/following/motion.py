@@ -38,6 +38,11 @@ class ToolMotion:
     ruled_by: str | None = None
     overlaps: bool = False
 
+    @property
+    def length(self) -> float:
+        """Length of the path, m, or rad where the tool turns in place; beside a zone that of a part."""
+        return float(self.law.piece_ends()[1][-1, 0]) if self.path is None else self.path.length
+
     def reference(self, times: Array, side: Side = "right") -> ToolReference:
         """Return the reference of the tool at times (N,) from the start of the move."""
         return self.reference_at(np.clip(times, self.law.start, self.law.end), side)

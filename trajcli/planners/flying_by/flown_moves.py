@@ -241,8 +241,16 @@ def moves_as_flown(moves: Sequence[PlannedMove], chain: FlownChain) -> Iterator[
         phases = tuple(_phases(parts))
         events = tuple(event for event in move.planned.events if event.kind in _OF_PATHS)
         continuity = move.planned.continuity
-        passed = _passed(chain, number, parts)
-        planned = Planned(curve, end, None, phases, events, None, passed, parts=parts, continuity=continuity)
+        planned = Planned(
+            curve,
+            end,
+            phases=phases,
+            events=events,
+            via_points=_passed(chain, number, parts),
+            wanted_speed=move.planned.wanted_speed,
+            continuity=continuity,
+            parts=parts,
+        )
         robot = reduce(with_looser_limits, robots[max(number - 1, 0) : number + 2], move.robot)
         yield replace(move, start=state, robot=robot, planned=planned, stretch=1.0)
         state = end

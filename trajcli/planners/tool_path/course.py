@@ -83,7 +83,7 @@ class ToolCourse(Course):
 
     def tool_constraint(self) -> PathConstraint:
         """Return the limits of the tool along it."""
-        return ToolConstraint(self.joints.executed, self.tcp, self.joints.path.speeds)
+        return ToolConstraint(self.joints.limited_by(self.tcp), self.tcp, self.joints.path.speeds)
 
     def rates(self, s: Array) -> PathRates:
         """Return derivatives at s (m,), with the lowest limits of speed there, where these step."""

@@ -24,7 +24,7 @@ from trajcli.kinematics.following.tracking import StuckError, track_branch
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import residual_jacobian
 from trajcli.kinematics.jacobian import jacobian
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.tool import limits_tool
 from trajcli.planners.planner import Event, Phase
 
@@ -250,6 +250,19 @@ class FollowedPath:
         from trajcli.kinematics.following.executed import ExecutedPoses
 
         return replace(self.path, poses=ExecutedPoses(self.path.poses, self.follower, self.coarse))
+
+    def limited_by(self, tcp: ToolLimits) -> ToolPath:
+        """Return the path as limits of the tool see it: a turn that is left free counts where one is of turning.
+
+        Where the tcp goes is known without the joints, which are found anew at each s for the turn alone.
+        """
+        speeds = self.path.speeds
+        turning = [
+            tcp.angular_speed,
+            tcp.angular_acceleration,
+            *([] if speeds is None else speeds.angular_speed),
+        ]
+        return self.executed if np.isfinite(turning).any() else self.path
 
     @contextmanager
     def diagnosed(self) -> Iterator[None]:

@@ -66,7 +66,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     limits, tcp = robot.limits, limits_of_law(spec, robot.limits.tcp, path.speeds)
     with joints.diagnosed():
         further = (
-            ToolConstraint(joints.executed, tcp, path.speeds, path.weaves),
+            ToolConstraint(joints.limited_by(tcp), tcp, path.speeds, path.weaves),
             *path_constraints(curve, robot),
         )
 
@@ -120,7 +120,7 @@ def jerk_constraints(
         spec: The law.
     """
     robot, limits = joints.robot, joints.robot.limits.tcp
-    _, first, second = joints.executed.poses.evaluate(np.linspace(0.0, joints.path.length, _SAMPLES), "right")
+    _, first, second = joints.path.poses.evaluate(np.linspace(0.0, joints.path.length, _SAMPLES), "right")
     straight = not second[:, :3].any()
     along = (limits.jerk if spec.jerk is None else spec.jerk) if straight else spec.jerk or math.inf
     of_tool = (math.inf if straight else limits.jerk), limits.angular_jerk
