@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from arm_calls import Arms, cases, ids, robot_file
 
+from trajcli.queries.jacobian import simplest
+
 F = "forward.yaml"
 FRAMES = {"base": "base", "tool": "tcp", "world": "world"}
 
@@ -86,6 +88,18 @@ def test_a_stretched_planar_arm(arms):
     radial = np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0, 0, 0, 0])
     basis = np.linalg.qr(np.array(directions).T)[0]
     assert basis @ (basis.T @ radial) == pytest.approx(radial, abs=1e-12)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 2.5, np.pi])
+def test_directions_have_their_signs_whatever_basis_an_arm_has(turn):
+    """Signs of singular vectors are those of a library; two components alike have no larger one."""
+    rows = np.array([[0.0, -0.6, 0.0, 0.8, 0.0], [0.5, 0.0, -0.5, 0.0, np.sqrt(0.5)]])
+    turned = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) @ rows
+    wanted = [[0.5, 0, -0.5, 0, np.sqrt(0.5)], [0, 0.6, 0, -0.8, 0]]
+    assert simplest(turned) == pytest.approx(np.array(wanted), abs=1e-12)
+    assert simplest(rows[:1] * np.cos(turn)) == pytest.approx(np.array(wanted[1:]), abs=1e-12)
+    alike = np.array([[0.0, -1.0, 1.0 - 1e-15, 1.0 + 1e-15]]) * (1 if turn < 1 else -1)
+    assert simplest(alike) == pytest.approx(np.array([[0, 1, -1, -1]]) / np.sqrt(3), abs=1e-12)
 
 
 def test_text(arms):

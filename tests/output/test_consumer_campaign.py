@@ -46,6 +46,7 @@ def of_last_bits(made: ForConsumer, shortest: float) -> float:
     """Return what the last bits of positions are of a limit of jerk: 60 / h^3 times as much, of a quintic.
 
     A polynomial of high degree is rounded in each of its terms: by how much is seen in numbers of more bits.
+    The jerk of scipy's curve is a third difference of Bernstein coefficients, 1, 3, 3 and 1 times half a bit.
     """
     if made.rows.interpolation != "quintic":
         return 0.0
@@ -54,7 +55,7 @@ def of_last_bits(made: ForConsumer, shortest: float) -> float:
     values = curve.evaluate(times)
     rounded = np.maximum(np.spacing(np.abs(values).max(axis=0)), _rounding(curve, times, values).max(axis=0))
     jerk = np.min([np.abs(move.robot.limits.jerk).min(axis=1) for move in made.plan.moves], axis=0)
-    return float((60.0 * 2.0 * rounded / steps[steps > shortest].min() ** 3 / jerk).max())
+    return float((60.0 * (2.0 + 4.0) * rounded / steps[steps > shortest].min() ** 3 / jerk).max())
 
 
 def _rounding(curve: PiecewisePolynomial, times: Array, values: Array) -> Array:

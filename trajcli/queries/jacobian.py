@@ -15,6 +15,7 @@ from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.pose import plain
 
 _DUST = 1e-12  # of a unit vector: what rounding leaves of a zero
+_ALIKE = 9  # decimals by which sizes differ: which of two alike is the larger one, only rounding would say
 
 
 def jacobian_report(
@@ -62,12 +63,15 @@ def _directions(arm: ArmInUnits, q: Array, frame: ReferenceFrame, blocked: Array
 
 
 def simplest(rows: Array) -> Array:
-    """Return unit vectors (k, m) that span the space of `rows`, with the zeros that elimination gives."""
+    """Return unit vectors (k, m) that span the space of `rows`, with the zeros that elimination gives.
+
+    Their first component that is not zero is positive, whatever signs the rows have.
+    """
     left = np.array(rows)
     done: list[int] = []
     for _ in range(len(left)):
         free = [i for i in range(len(left)) if i not in done]
-        largest = int(np.abs(left[free]).argmax())
+        largest = int(np.round(np.abs(left[free]), _ALIKE).argmax())
         row, column = free[largest // left.shape[1]], largest % left.shape[1]
         left[row] /= left[row, column]
         others = [i for i in range(len(left)) if i != row]
@@ -75,5 +79,6 @@ def simplest(rows: Array) -> Array:
         done.append(row)
     left[np.abs(left) < _DUST] = 0.0
     first = np.array([np.argmax(row != 0.0) for row in left], dtype=np.intp)
-    unit: Array = left / np.linalg.norm(left, axis=1, keepdims=True)
-    return unit[np.argsort(first, kind="stable")]
+    signs = np.sign(left[np.arange(len(left)), first])[:, None]
+    unit: Array = left / (signs * np.linalg.norm(left, axis=1, keepdims=True))
+    return unit[np.argsort(first, kind="stable")] + 0.0

@@ -252,7 +252,7 @@ class FollowedPath:
         return replace(self.path, poses=ExecutedPoses(self.path.poses, self.follower, self.coarse))
 
     def limited_by(self, tcp: ToolLimits) -> ToolPath:
-        """Return the path as limits of the tool see it: a turn that is left free counts where one is of turning.
+        """Return the path as limits of the tool see it: a turn that is left free counts where one limits it.
 
         Where the tcp goes is known without the joints, which are found anew at each s for the turn alone.
         """
