@@ -149,6 +149,10 @@ def _no_jerk(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) ->
         move["limits"].pop("jerk")
 
 
+def _no_jerk_of_tool(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) -> None:
+    job["limits"]["tcp"].pop(match[1].replace(" ", "_"))
+
+
 def _set(name: str, value: Any, of: str | None = None) -> Callable[..., Any]:
     def follow(job: Job, move: Job, complaint: Complaint, match: re.Match[str]) -> Any:
         given = float(match[1]) if value is None else value
@@ -223,6 +227,7 @@ HINTS: tuple[Rule, ...] = (
     (r"say `overshoot: true`", _set("overshoot", value=True)),
     (r"say `end_blends: (\w+)`", lambda job, move, c, m: move.update(end_blends=m[1])),
     (r"leave `duration` out", _drop("duration")),
+    (r"leave the limit of the tool's ((?:angular )?jerk) out", _no_jerk_of_tool),
     (rf"allow a `duration` of {NUMBER} s under `law`", _set("duration", None, "law")),
     (r"add `limits: ", _missing),
 )

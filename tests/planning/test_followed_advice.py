@@ -31,6 +31,7 @@ TO = {"joints": [1, 0.4]}
 THROUGH = [{"joints": [1, 1]}]
 TCP = {"speed": 0.5, "acceleration": 2, "angular_speed": 2, "angular_acceleration": 9}
 ARM = {"joints": [0, -1.57, 1.57, 0, 1.57, 0]}
+BENT = {"joints": [0.4, -1.57, 1.57, 0, 1.57, 0.3]}
 AWAY = {"xyz": [0.4, 0.3, 0.4]}
 ARC = {"via": {"xyz": [0.45, 0.25, 0.42]}, "to": AWAY}
 
@@ -135,6 +136,28 @@ def test_laws_of_the_tool(law: Job, jerk: float | None) -> None:
     failing = tool_job({"planner": "line", "to": AWAY, "law": law}, jerk=jerk)
     if complaints(failing):
         assert follows_every(failing)
+
+
+@pytest.mark.parametrize(
+    ("move", "limit", "named"),
+    [
+        ({"planner": "trapezoid", "to": BENT}, "jerk", 3),
+        ({"planner": "cubic", "duration": 1.5, "to": BENT}, "angular_jerk", 3),
+        ({"planner": "line", "to": AWAY, "law": {"shape": "trapezoid"}}, "jerk", 3),
+        ({"planner": "spline", "rule": "clamped", "through": [BENT], "to": ARM, "duration": 3}, "jerk", 2),
+    ],
+    ids=["trapezoid", "cubic", "line", "spline"],
+)
+def test_what_has_no_steps_is_named_where_the_tool_has_a_limit_of_jerk(
+    move: Job, limit: str, named: int
+) -> None:
+    """Each planner is tried beforehand; none is named by words that leave the choice open."""
+    tcp = {"speed": 0.5, "acceleration": 2, limit: 30}
+    failing = job(move, robot="ur5e", start=ARM, limits={"velocity": 3, "acceleration": 8, "tcp": tcp})
+    steps = [c for c in complaints(failing) if c.what.startswith("tool_")]
+    assert steps
+    assert "whose acceleration does not step" not in steps[0].hint
+    assert len(set(follows_every(failing))) >= named
 
 
 @pytest.mark.parametrize("seed", few(range(45), 6))

@@ -16,9 +16,8 @@ from trajcli.limits.tolerances import TOOL_RELATIVE, allowed_jump
 from trajcli.limits.tool_bound import ToolPeak, tool_bounds
 from trajcli.trajectory import State, Trajectory
 
-_SMOOTH_HINT = (
-    "use a planner or a law whose acceleration does not step, or leave the limit of the tool's {words} out"
-)
+SMOOTH = "a planner or a law whose acceleration does not step"
+_SMOOTH_HINT = f"use {SMOOTH}, or leave the limit of the tool's {{words}} out"
 
 
 @frozen

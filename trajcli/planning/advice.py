@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from typing import Any
 
@@ -13,9 +14,16 @@ from trajcli.errors import Amount, Problem, TrajcliError, at_least
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import LIMITS_OF_JOINTS
+from trajcli.limits.tool import SMOOTH
 from trajcli.planners import changed
 from trajcli.planners.planner import PlannedMove, Planner
-from trajcli.planning.retime import over_limit, slow_to_limits, smallest_stretch
+from trajcli.planning.retime import (
+    STEPS_OF_TOOL,
+    keep_further_limits,
+    over_limit,
+    slow_to_limits,
+    smallest_stretch,
+)
 
 Say = Callable[[Amount], str]
 
@@ -48,6 +56,8 @@ def _advised(own: list[Finding], move: PlannedMove, moves: Sequence[PlannedMove]
         alone = False
     else:
         alone = all(finding.factor is not None for finding in own)
+    if any(finding.kind in STEPS_OF_TOOL for finding in own):
+        own = _without_tool_steps(own, move)
     slow = [f for f in own if f.factor is not None and not (f.kind == "jerk" and not alone)]
     if not slow and move.not_slowed is None:
         return own
@@ -104,9 +114,9 @@ def _planned(move: PlannedMove, planner: Planner, robot: Robot | None = None) ->
     arm = robot or move.robot
     try:
         planned = planner.plan(move.start, arm)
+        return keep_further_limits(replace(move, planner=planner, planned=planned, robot=arm))
     except TrajcliError:
         return None
-    return replace(move, planner=planner, planned=planned, robot=arm)
 
 
 def _kinds(move: PlannedMove) -> set[str]:
@@ -131,10 +141,19 @@ def _without_steps(own: Sequence[Finding], move: PlannedMove, moves: Sequence[Pl
     return ", or ".join(parts) or "lower the jerk by another target or start"
 
 
-def _smoother(move: PlannedMove) -> str:
-    """Return the planners, or fields, by which acceleration joins in the move: those that pass, if any do."""
+def _without_tool_steps(own: Sequence[Finding], move: PlannedMove) -> list[Finding]:
+    """Return the findings about a move; those of steps of the tool name what has none."""
+    words = _smoother(move, {_STEP, *STEPS_OF_TOOL})
+    return [
+        replace(f, hint=(f.hint or "").replace(SMOOTH, words)) if words and f.kind in STEPS_OF_TOOL else f
+        for f in own
+    ]
+
+
+def _smoother(move: PlannedMove, steps: AbstractSet[str] = frozenset({_STEP})) -> str:
+    """Return the planners, or fields, by which a move has no such steps: those that pass, if any do."""
     tried = [(words, _changed(move, change)) for words, change in move.planner.smoother.items()]
-    smooth = [(words, other) for words, other in tried if other is not None and _STEP not in _kinds(other)]
+    smooth = [(words, other) for words, other in tried if other is not None and not steps & _kinds(other)]
     fitting = [words for words, other in smooth if not _kinds(other)]
     if fitting or move.over_limit == "slow":
         return " or ".join(fitting or [words for words, _ in smooth])

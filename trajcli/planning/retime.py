@@ -25,7 +25,7 @@ from trajcli.units import effort_unit
 
 LONGEST = 1e4
 """Times the planned duration: a move that needs more is not over its limit, it is wrong."""
-_STEPS_OF_TOOL = {
+STEPS_OF_TOOL = {
     f"{kind.name}_jump": KIND_OF[kind.name.replace("acceleration", "jerk")]
     for kind in TOOL_KINDS
     if kind.order == 2
@@ -79,7 +79,7 @@ def keep_further_limits(move: PlannedMove) -> PlannedMove:
     if not (finds and has_further_limits(move.robot.limits)):
         return move
     found = _findings(move)
-    steps = [finding for finding in found if finding.kind in _STEPS_OF_TOOL]
+    steps = [finding for finding in found if finding.kind in STEPS_OF_TOOL]
     if steps:  # no stretch helps
         return _within_tool_limits(move, steps, inf) or move
     left = {"never", "on paths"} if move.planned.tool is None else {"never"}
@@ -115,7 +115,7 @@ def _within_tool_limits(move: PlannedMove, over: Sequence[Finding], stretched: f
     other = replace(move, planned=planned)
     found = _findings(other)
     left = [finding.factor or LONGEST for finding in _slowed(found)]
-    left += [inf for finding in found if finding.kind in _STEPS_OF_TOOL]
+    left += [inf for finding in found if finding.kind in STEPS_OF_TOOL]
     least = getattr(move.planner, "minimum_duration", None) or 0.0
     duration = max(other.duration * max([1.0, *left]), least)
     if duration >= stretched:
@@ -239,7 +239,7 @@ def _slowed(findings: Sequence[Finding]) -> list[Finding]:
 
 def _limit_of(finding: Finding) -> LimitKind:
     """Return the limit that a finding is about."""
-    return _STEPS_OF_TOOL.get(finding.kind) or KIND_OF[finding.kind]
+    return STEPS_OF_TOOL.get(finding.kind) or KIND_OF[finding.kind]
 
 
 def require_holdable(move: PlannedMove) -> None:
