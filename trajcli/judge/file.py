@@ -213,7 +213,8 @@ def _made_for(
 def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: Units | None) -> MotionFile:
     """Return the motion of a file; joints that it does not have are found back from its poses."""
     joints, types = given.robot.joint_names, given.robot.joint_types
-    if given.plan is not None and options.columns is None and options.topic is None:
+    named = (options.columns, options.topic, options.field)  # what one of them is about has joints
+    if given.plan is not None and not any(named):
         from trajcli.judge.rows.tool_rows import joints_found_back
 
         found = joints_found_back(source, given.plan.loaded.robot_of_rows, given.plan)
@@ -300,7 +301,7 @@ def _moves_by_time(given: _Given, motion: MotionFile) -> Callable[[RecordedMotio
     if given.plan is None:
         return None
     trajectory = given.plan.trajectory
-    stamps = [(rows.t[0], rows.t[-1]) for rows in motion.blocks() if rows.t.size]
+    stamps = [(rows.t[0], rows.t[-1]) for rows in motion.blocks()]
     if not stamps:
         return None
     first, last = float(stamps[0][0]), float(stamps[-1][1])
