@@ -72,6 +72,21 @@ def test_uses_of_pieces_are_those_of_each_piece_alone(seed: int) -> None:
             assert min(of_piece, 1e8) == pytest.approx(min(use.used, 1e8), rel=1e-9)
 
 
+@pytest.mark.parametrize("factor", [1 - 1e-4, 1.0, 1 + 1e-4])
+def test_who_brakes_into_a_bound_is_over_its_limit_by_no_rounding_there(factor: float) -> None:
+    """x = d f^2 (T - t)^2 / 2 has v / sqrt(2 d x) = f: near to its end x is rounded to nothing sooner than v."""
+    rng = np.random.default_rng(3)
+    for sign in (1.0, -1.0) * 40:
+        d, duration, bound = rng.uniform((0.5, 0.1, 0.5), (20.0, 2.0, 4.0))
+        q = -sign * 0.5 * d * factor**2 * np.array([1.0, -2 * duration, duration**2])
+        q[-1] += sign * bound
+        limits = ApproachLimits(
+            np.array([[-99.0, bound] if sign > 0 else [-bound, 99.0]]), np.array([d]), np.zeros(1)
+        )
+        (use,) = approach_uses(np.array([0.0, duration]), q[:, None, None], limits)
+        assert use.used == pytest.approx(factor, rel=1e-7)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_braking_with_the_deceleration_of_the_limit_uses_all_of_it_everywhere(sign: float) -> None:
     """With o = 0 the motion x = d (T - t)^2 / 2 has v = sqrt(2 d x): a hundredth of a per cent more is over."""

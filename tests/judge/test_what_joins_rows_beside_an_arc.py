@@ -176,5 +176,6 @@ def test_rounding_of_planned_rows_explains_a_little(less: float, *, over: bool) 
     """Nine decimals of three slides explain 3e-9: where the path promises little less than the height of a chord."""
     turned = [np.pi / 2 * (10 * u**3 - 15 * u**4 + 6 * u**5) for u in (0.5, 0.5 + 0.002 / 0.3)]
     plan = planned(1, height(turned[1] - turned[0]) - less)
-    assert [each.row for each in of_plan(plan, 500)] == [76]
+    (found,) = of_plan(plan, 500)
+    assert found.row in (75, 76)  # the chords on both sides of the middle are equal
     assert bool(of_plan(plan, 500, exact=False)) is over

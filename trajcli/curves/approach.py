@@ -27,6 +27,7 @@ from trajcli.frozen import comparable, frozen
 
 ROOM = 1e-12
 """Speed, SI, that is allowed at any distance: what rounding makes of rest."""
+_ROUNDING = 8 * 2.0**-52  # of the numbers that make a distance: by so much it is taken for larger
 _SETTLED = 1e-13  # relative: a use that is raised by less is found
 _STEPS = 60
 _HOPELESS = 1e9  # a use above it is not worth more digits
@@ -98,7 +99,7 @@ def approach_uses(breaks: Array, coefficients: Array, limits: ApproachLimits) ->
         limits: Of the n components.
     """
     limited, found = limits.limited, []
-    approaches, d, o = _approaches(coefficients, limits)
+    approaches, d, o = _approaches(coefficients, np.diff(breaks), limits)
     used, times = _piece_uses(approaches, np.diff(breaks), d, o)
     for k, component in enumerate(limited.tolist()):
         both = used[:, [k, k + limited.size]]
@@ -128,7 +129,7 @@ def uses_of_pieces(
         limits: Of the n components, m of which have one.
         at_least: What uses less may use a little more than is returned.
     """
-    approaches, d, o = _approaches(coefficients, limits)
+    approaches, d, o = _approaches(coefficients, lengths, limits)
     return _piece_uses(approaches, lengths, d, o, at_least)
 
 
@@ -141,7 +142,7 @@ def durations_at_limit(coefficients: Array, lengths: Array, limits: ApproachLimi
         limits: Of the n components, m of which have one.
         near: Relative: as near as that to the limit counts.
     """
-    approaches, d, o = _approaches(coefficients, limits)
+    approaches, d, o = _approaches(coefficients, lengths, limits)
     shape = approaches.shape[1:]
     distances = approaches.reshape(len(approaches), -1)
     speeds = -derivative_coefficients(distances, 1)
@@ -160,12 +161,18 @@ def durations_at_limit(coefficients: Array, lengths: Array, limits: ApproachLimi
     return np.asarray(seconds[: shape[1] // 2] + seconds[shape[1] // 2 :])
 
 
-def _approaches(coefficients: Array, limits: ApproachLimits) -> tuple[Array, Array, Array]:
-    """Return the distances (degree + 1, w, 2 m) to upper and then lower ends, and limits (2 m,)."""
+def _approaches(coefficients: Array, lengths: Array, limits: ApproachLimits) -> tuple[Array, Array, Array]:
+    """Return the distances (degree + 1, w, 2 m) to upper and then lower ends, and limits (2 m,).
+
+    They are larger by what rounding makes of them: who brakes into a bound comes near to it with a speed that
+    is large beside the root of a distance which is rounded to nothing.
+    """
     limited = limits.limited
     to_upper, to_lower = -coefficients[:, :, limited], coefficients[:, :, limited]
-    to_upper[-1] += limits.position[limited, 1]
-    to_lower[-1] -= limits.position[limited, 0]
+    low, high = limits.position[limited].T
+    summed = horner(np.abs(to_lower), lengths[:, None])
+    to_upper[-1] += high + _ROUNDING * (summed + np.abs(high))
+    to_lower[-1] -= low - _ROUNDING * (summed + np.abs(low))
     d, o = (np.tile(each[limited], 2) for each in (limits.deceleration, limits.offset))
     return np.concatenate([to_upper, to_lower], axis=2), d, o
 

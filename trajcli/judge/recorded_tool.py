@@ -35,6 +35,7 @@ _NEAR_SINGULAR = (
 _TWICE = 2.0  # times a limit: no interpolation of dense rows that keep it goes so far beyond
 _CLOSE = 1e-6  # relative: what the slack of checks leaves of a chord
 _SAME_STEP = 4.0  # times the steps beside it: more is a jump of the tool
+_MEET = 1e-9  # of the shortest piece: as near to where two meet, either may have a peak
 _STEP = 1e-6  # m or rad: a step of the tool that is none
 
 
@@ -157,7 +158,7 @@ class ToolJudge:
         warned: bool,
     ) -> None:
         limit = float(getattr(robot.limits.tcp, kind.key))
-        piece = self._piece_at(window, pieces, peak.time)
+        piece = self._piece_at(window, pieces, robot, kind, peak.time)
         rounding = self._rounding(window, piece, kind)
         row = window.row_at(piece, peak.time - float(window.t[piece]))
         finding = replace(tool_excess(kind, peak.upper_bound, limit, peak.time), row=row, rounding=rounding)
@@ -174,8 +175,19 @@ class ToolJudge:
         )
 
     @staticmethod
-    def _piece_at(window: Intervals, pieces: slice, time: float) -> int:
-        return int(np.clip(np.searchsorted(window.t, time, "right") - 1, pieces.start, pieces.stop - 1))
+    def _piece_at(window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, time: float) -> int:
+        """Return the piece with its peak at a time: of two that meet there the one with the higher peak."""
+        near = _MEET * float(window.lengths[pieces].min())
+        found = np.searchsorted(window.t, [time - near, time + near], "right") - 1
+        before, after = np.clip(found, pieces.start, pieces.stop - 1).tolist()
+        if before == after:
+            return int(after)
+        peaks = [
+            tool_peaks(robot, np.append(0.0, window.lengths[piece]), window.coefficients[:, [piece]])
+            for piece in (before, after)
+        ]
+        high, other = (peak[kind.key].upper_bound for peak in peaks)
+        return int(before if high > other else after)
 
     def _only_between(
         self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, peak: ToolPeak
@@ -186,7 +198,8 @@ class ToolJudge:
         lengths = window.lengths[pieces, None]
         if lengths.max() > DENSE or peak.upper_bound > _TWICE * limit:
             return False
-        rounding = self._rounding(window, self._piece_at(window, pieces, peak.time), kind)
+        piece = self._piece_at(window, pieces, robot, kind, peak.time)
+        rounding = self._rounding(window, piece, kind)
         slack = limit * (1 + _CLOSE) + rounding
         rows = slice(pieces.start, pieces.stop + 1)
         states = tuple(None if values is None else values[rows] for values in window.states)
