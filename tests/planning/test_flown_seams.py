@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cli.running import call
-from planned_examples import share_plans
+from planned_examples import planned_once, share_plans
 
 from trajcli.grids import ListedGrid
-from trajcli.job.read import job_from_text
+from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.robot import Limits
 from trajcli.output.report import report_of
 from trajcli.peers.lower_bound import LowerBound, fastest_duration
@@ -52,16 +51,24 @@ def speed(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     return np.asarray(np.hypot(*rates))
 
 
-@cache
-def lines() -> Plan:
-    plan = plan_job(job_from_text(json.dumps(LINES)))
+@pytest.fixture(scope="module")
+def job(tmp_path_factory) -> Path:
+    """Return the file of the job, whose plan the tests share."""
+    file = tmp_path_factory.mktemp("lines") / "job.yaml"
+    file.write_text(json.dumps(LINES))
+    return file
+
+
+@pytest.fixture
+def lines(job: Path) -> Plan:
+    plan = planned_once(load_job(job))
     assert plan.verdict.passed
     return plan
 
 
 @pytest.mark.full
-def test_columns_of_the_path_say_where_the_tool_is_on_it_and_stand_in_a_zone():
-    plan = lines()
+def test_columns_of_the_path_say_where_the_tool_is_on_it_and_stand_in_a_zone(lines):
+    plan = lines
     (zone,) = plan.flyby.zones
     times = np.arange(0, plan.trajectory.duration, 1 / 2048)
     (rows,) = sample(
@@ -81,9 +88,9 @@ def test_columns_of_the_path_say_where_the_tool_is_on_it_and_stand_in_a_zone():
     assert np.abs(changes - sdd[:-1][on_path[1:] & on_path[:-1]]).max() < 0.1 * np.abs(sdd).max()
 
 
-def test_the_report_of_the_tool_is_that_of_its_path_between_zones():
+def test_the_report_of_the_tool_is_that_of_its_path_between_zones(lines):
     """Its peaks beside zones are those of the tool by the textbook; the whole path has the length that it has."""
-    plan = lines()
+    plan = lines
     (zone,) = plan.flyby.zones
     ends = (0.0, zone.entered), (zone.left, plan.trajectory.duration)
     lengths = [np.linalg.norm(place(np.array(START)) - CORNER), CORNER[0] - END[0]]
@@ -129,11 +136,10 @@ def test_a_wanted_speed_is_held_on_so_much_of_a_path_between_zones_and_explained
 
 
 def test_rows_of_another_motion_are_compared_with_the_path_outside_of_zones(
-    tmp_path: Path, capfd, monkeypatch
+    job: Path, tmp_path: Path, capfd, monkeypatch
 ):
     share_plans(monkeypatch)
-    job, rows = tmp_path / "job.yaml", tmp_path / "rows.csv"
-    job.write_text(json.dumps(LINES))
+    rows = tmp_path / "rows.csv"
     assert call(capfd, "plan", job, "-q", "-o", rows).code == 0
     head, *lines_of = rows.read_text().splitlines()
     columns = head.split(",")

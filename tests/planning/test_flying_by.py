@@ -442,7 +442,8 @@ def test_a_job_that_lacks_a_limit_says_which():
     assert "velocity" in str(caught.value)
 
 
-def test_rows_and_reports_say_where_zones_are():
+def test_rows_and_reports_say_where_zones_are(monkeypatch):
+    monkeypatch.setattr("trajcli.planners.flying_by.proven_bound._PROGRAMMES", 8)  # a bound, if none so close
     plan = pick(20)
     report = report_of(plan)
     assert report.flyby is not None

@@ -76,9 +76,9 @@ def spline_through(rule: Rule, parameter: Parameter, points: PointTable, robot: 
             slopes[k] = chord
     rates = np.zeros_like(points.rates)
     rates[0, [0, -1]] = slopes
-    known = replace(points, rates=rates)
+    sloped = replace(points, rates=rates)
     try:
-        curve = curve_through(rule, _bent_where_all_turn(known, s) if rule == "quintic" else known, s)
+        curve = curve_through(rule, _bent_where_all_turn(sloped, s) if rule == "quintic" else sloped, s)
     except ShapeError as error:
         name = robot.joint_names[error.component]
         message = f"the velocity of {name} at the {error.end} point does not let the path be monotone there"
@@ -144,9 +144,9 @@ def polyline_through(points: PointTable, corner: Array, robot: Robot, *, smooth:
     sharpest = (turn / corner).max(axis=1)
     back = _turns_back(slopes)
     wanted[1:-1] = np.where(back, 0.0, 1.0 / beside / np.where(sharpest > 0, sharpest, np.inf))
-    room = np.diff(s)
+    spans = np.diff(s)
     limit = np.full(points.count, np.inf)
-    limit[1:-1] = _ROOM * np.minimum(room[:-1], room[1:])
+    limit[1:-1] = _ROOM * np.minimum(spans[:-1], spans[1:])
     used = np.minimum(wanted, limit)
     if smooth:
         curve, missed = rounded_polyline(s, q, used)

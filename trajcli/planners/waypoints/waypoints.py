@@ -105,7 +105,7 @@ class FastestThroughPoints(PointSequence):
         ),
     ] = False
 
-    _known: Array | None = PrivateAttr(default=None)
+    _begun: Array | None = PrivateAttr(default=None)
 
     @property
     def why_not_flown_by(self) -> str | None:
@@ -186,7 +186,7 @@ class FastestThroughPoints(PointSequence):
         copy, passed = self.model_copy(), planned.via_points
         if passed is not None and not planned.parts:  # what flies by a corner passes not all of its points
             rates = (planned.curve.evaluate(passed.times, order) for order in (1, 2))
-            copy._known = np.stack([*rates], axis=2)  # noqa: SLF001
+            copy._begun = np.stack([*rates], axis=2)  # noqa: SLF001
         return copy
 
     def _through(self, points: GivenPoints, robot: Robot) -> Planned:
@@ -200,8 +200,8 @@ class FastestThroughPoints(PointSequence):
         if self.straight:
             fastest = straight_only(problem, names, self.starts)
         else:
-            known = None if self._known is None else self._known[:, joints]
-            fastest = fastest_motion(problem, names, self.starts, known)
+            states = None if self._begun is None else self._begun[:, joints]
+            fastest = fastest_motion(problem, names, self.starts, states)
         motion = fastest.motion.among(joints, points.positions[0])
         off, times = off_chords(motion, points.positions, robot.limits.velocity)
         joint = None if fastest.joint is None else int(joints[fastest.joint])
