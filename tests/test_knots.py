@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
@@ -224,6 +226,61 @@ def test_breaks_within_a_microsecond_are_one_knot() -> None:
     assert (knots.nanoseconds[at - 1 : at + 1] - 1_000_000_000).tolist() == [-200_000, 200_000]
     assert knots.acceleration[at - 1 : at + 1, 0].tolist() == [1.0, -1.0]
     assert knots.deviation.position <= 1e-7  # 0.3 us of an acceleration of 2 rad/s^2, for a second
+
+
+def rising(breaks: list[float], highest: list[float], degree: int) -> PiecewisePolynomial:
+    """Return the smooth curve from rest at zero whose highest derivative is constant on each piece."""
+    state, pieces = np.zeros(degree), []
+    for length, value in zip(np.diff(breaks), highest, strict=True):
+        taylor = np.poly1d(np.append(value, state) / [math.factorial(k) for k in range(degree, -1, -1)])
+        pieces.append(
+            taylor.coeffs if taylor.order == degree else np.append(np.zeros(degree - taylor.order), taylor)
+        )
+        state = np.array(
+            [taylor.deriv(k)(length) if k else taylor(length) for k in range(degree - 1, -1, -1)]
+        )
+    return PiecewisePolynomial(np.array(breaks), np.array(pieces).T[:, :, None])
+
+
+def ending(curve: PiecewisePolynomial) -> State:
+    return State(*(curve.evaluate(curve.end, order) for order in range(3)))
+
+
+@pytest.mark.parametrize(
+    ("breaks", "jerks"),
+    [
+        ([0.0, 0.0100000004, 10.0], [20.0, 0.0]),
+        ([0.0, 9.9899999996, 10.1], [0.05, -6.0]),
+        ([0.0, 0.3, 0.3000087, 1.2], [2.0, 0.0, -2.0]),
+    ],
+)
+def test_breaks_off_their_knots_cost_nothing_over_long_intervals(
+    breaks: list[float], jerks: list[float]
+) -> None:
+    """A jerk j that ends e after its knot leaves e j of acceleration, which a quintic carries h^2 / 58 far."""
+    trajectory = made_of(curve := rising(breaks, jerks, 3), ending(curve))
+    knots = knots_of(trajectory)
+    assert largest_differences(trajectory, knots)[0] <= 1e-9
+    assert knots.deviation.position <= 1e-9
+    assert len(knots.nanoseconds) <= 16
+
+
+def test_cubics_cost_nothing_where_the_acceleration_steps_off_its_knot() -> None:
+    """Of a step a that comes e before its knot a velocity e a is left, which a cubic carries 4 h / 27 far."""
+    trajectory = made_of(curve := rising([0.0, 19.0000000004, 20.0], [1.0, -9.0], 2), ending(curve))
+    knots = knots_of(trajectory, 2)
+    joined = CubicHermiteSpline(knots.times, knots.position, knots.velocity)
+    t = np.linspace(0.0, min(curve.end, knots.times[-1]), 20_001)
+    assert np.abs(joined(t) - curve.evaluate(t)).max() <= 1e-9
+    assert len(knots.nanoseconds) <= 16
+
+
+def test_what_knots_cannot_cure_has_no_more_of_them() -> None:
+    """Positions of 10^8 are rounded by 1e-8; a velocity that changes in 3 ns is there in no row."""
+    far = rising([0.0, 0.1, 100.0, 100.1], [1e7, 0.0, -1e7], 2)
+    assert len(knots_of(made_of(far, ending(far)), 2).nanoseconds) == 4
+    ramp = rising([0.0, 0.1, 0.100000003, 2.0], [0.0, 1e8, 0.0], 2)
+    assert len(knots_of(made_of(ramp, ending(ramp)), 2).nanoseconds) <= 70
 
 
 def test_an_end_in_motion_keeps_its_velocity() -> None:

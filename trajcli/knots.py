@@ -3,10 +3,11 @@
 A controller that interpolates position, velocity and acceleration runs the quintic Hermite polynomial
 between neighbouring knots, one without accelerations the cubic. A knot stands at each break of the curve,
 rounded to whole nanoseconds, with the state that the curve has at the rounded time. Where the curve is no
-such polynomial, knots are inserted. Where the acceleration steps by a, quintics have one knot a little before
-and one as much behind, at the distance d: between them the acceleration rises evenly, which takes the
-position further by a d^2 / 6, and the knot behind holds that. A quintic between states of the curve itself
-would pass the accelerations on both sides by a twentieth of the step.
+such polynomial, knots are inserted, and where a long interval carries far what the rounding changes. Where
+the acceleration steps by a, quintics have one knot a little before and one as much behind, at the distance
+d: between them the acceleration rises evenly, which takes the position further by a d^2 / 6, and the knot
+behind holds that. A quintic between states of the curve itself would pass the accelerations on both sides
+by a twentieth of the step.
 
 Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots (2008), section 2.1.
 """
@@ -38,6 +39,7 @@ from trajcli.trajectory import Trajectory
 Nanoseconds = NDArray[np.int64]
 
 LARGEST_DEVIATION = 1e-6  # rad or m: what quintics between knots may miss, where knots can be inserted
+_OFF_BREAKS = 5e-10  # rad or m: likewise, where only knots beside their breaks make a difference
 _NEAREST = 1000  # ns: no closer knots are inserted, nor rows beside them
 _ONE = 10_000  # ns: breaks closer than this have one knot, as rounding is a jerk of 60 e / h^3 between two
 _PER_SECOND = 1e9
@@ -126,13 +128,13 @@ def knots_of(trajectory: Trajectory, stated: int = _QUINTIC) -> Knots:
             f"the trajectory lasts {trajectory.duration:.6g} s, and knots stand at whole nanoseconds",
             hint=f"up to {_LONGEST:.6g} s they can be told apart; rows at a rate have no such bound",
         )
-    whole, further = _first_knots(curve, stated)
+    whole, further, allowed = _first_knots(curve, stated)
     while True:
         states = _states(trajectory, whole)
         for time, shift in further.items():
             states[0, np.searchsorted(whole, time)] += shift
         missed = _missed(curve, whole, states[:stated])
-        inserted = _insertions(whole, missed[0].max(axis=1), stated)
+        inserted = _insertions(whole, missed[0].max(axis=1), stated, allowed)
         if not inserted.size:
             return Knots(whole, states[0], states[1], states[2], _deviation(missed))
         whole = np.sort(np.concatenate([whole, inserted]))
@@ -199,10 +201,11 @@ def _deviation(missed: Array) -> Deviation:
     return Deviation(position, velocity, acceleration, (joints[0], joints[1], joints[2]))
 
 
-def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, dict[int, Array]]:
+def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, dict[int, Array], float]:
     """Return the breaks in whole nanoseconds, of quintics two about each step of the acceleration.
 
-    Behind a step the position is another: the second value says by how much, (n,) at each such time.
+    Behind a step the position is another: the second value says by how much, (n,) at each such time. The last
+    one is what may be missed of the position.
     """
     breaks = curve.breaks - curve.start
     whole = np.rint(breaks * _PER_SECOND).astype(np.int64)
@@ -212,10 +215,11 @@ def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, 
     spacing = np.maximum(_ROUNDING, 4 * np.spacing(breaks))
     whole += up & (whole / _PER_SECOND < breaks - spacing)
     kept = _apart(whole)
+    allowed = _allowed(curve, stated, stepping=stated == _QUINTIC and bool(steps.any()))
     times, steps = whole[kept], _steps(curve, kept)
     sizes = np.abs(steps).max(axis=1, initial=0.0)
     if stated < _QUINTIC or not sizes.any():
-        return times, {}
+        return times, {}, allowed
     lengths = np.diff(times)
     nearest = np.minimum(np.append(lengths[:1], lengths), np.append(lengths, lengths[-1:]))
     with np.errstate(divide="ignore"):
@@ -226,7 +230,22 @@ def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, 
     behind = times[split] + away
     shifts = steps[split] * ((away / _PER_SECOND) ** 2 / 6)[:, None]
     both = np.concatenate([np.delete(times, split), times[split] - away, behind])
-    return np.sort(both), dict(zip(behind.tolist(), shifts, strict=True))
+    return np.sort(both), dict(zip(behind.tolist(), shifts, strict=True)), allowed
+
+
+def _allowed(curve: PiecewisePolynomial, stated: int, *, stepping: bool) -> float:
+    """Return what may be missed of the position, rad or m: least where all pieces are as those between knots.
+
+    Knots cannot cure rounding, nor velocities that change in less than what one knot takes.
+    """
+    most = LARGEST_DEVIATION * (1.0 if stated == _QUINTIC else _FEWER)
+    if stepping or np.any(curve.coefficients[: -2 * stated]):
+        return most
+    position, velocity = (np.stack(curve.piece_ends(order)) for order in (0, 1))
+    rounding = float(np.spacing(np.abs(position).max()))
+    short = curve.lengths < _ONE / _PER_SECOND
+    ramp = np.abs(velocity[1] - velocity[0])[short].max(initial=0.0) * _NEAREST / _PER_SECOND
+    return min(most, max(_OFF_BREAKS, 4.0 * rounding, float(ramp)))
 
 
 def _steps(curve: PiecewisePolynomial, kept: NDArray[np.intp]) -> Array:
@@ -330,10 +349,9 @@ def _may_count(
     return counts
 
 
-def _insertions(whole: Nanoseconds, missed: Array, stated: int) -> Nanoseconds:
+def _insertions(whole: Nanoseconds, missed: Array, stated: int, allowed: float) -> Nanoseconds:
     """Return times inside the intervals that miss too much, as long as these can be divided."""
     lengths = np.diff(whole)
-    allowed = LARGEST_DEVIATION * (1.0 if stated == _QUINTIC else _FEWER)
     wanted = np.ceil((missed / allowed) ** (0.5 / stated) * (1 + _ROUNDING))
     parts = np.minimum(np.clip(wanted, 1, _MOST_PARTS).astype(np.int64), lengths // _NEAREST)
     times = [

@@ -230,7 +230,7 @@ def test_chains_through_zones_are_searched_once_for_all_stretches(monkeypatch: p
 
     monkeypatch.setattr(flown_job, "flown", counted)
     hint, _ = _attempts(monkeypatch, "flying_cell", "ros-jtc")
-    assert re.fullmatch(r"`--set when_over_limit=slow` keeps all limits, with 3\.46\d* s", hint), hint
+    assert re.fullmatch(r"`--set when_over_limit=slow` keeps all limits, with 3\.4[56]\d* s", hint), hint
     assert len(searched) == 3
     made = made_for("flying_cell", "ros-jtc")
     assert largest_share(made.plan, made.grid, 1e-4) <= 1 + 10 * WITHIN
