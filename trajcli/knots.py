@@ -238,14 +238,14 @@ def _allowed(curve: PiecewisePolynomial, stated: int, *, stepping: bool) -> floa
 
     Knots cannot cure rounding, nor velocities that change in less than what one knot takes.
     """
-    most = LARGEST_DEVIATION * (1.0 if stated == _QUINTIC else _FEWER)
+    largest = LARGEST_DEVIATION * (1.0 if stated == _QUINTIC else _FEWER)
     if stepping or np.any(curve.coefficients[: -2 * stated]):
-        return most
+        return largest
     position, velocity = (np.stack(curve.piece_ends(order)) for order in (0, 1))
     rounding = float(np.spacing(np.abs(position).max()))
     short = curve.lengths < _ONE / _PER_SECOND
     ramp = np.abs(velocity[1] - velocity[0])[short].max(initial=0.0) * _NEAREST / _PER_SECOND
-    return min(most, max(_OFF_BREAKS, 4.0 * rounding, float(ramp)))
+    return min(largest, max(_OFF_BREAKS, 4.0 * rounding, float(ramp)))
 
 
 def _steps(curve: PiecewisePolynomial, kept: NDArray[np.intp]) -> Array:

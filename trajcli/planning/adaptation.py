@@ -13,7 +13,7 @@ from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import KIND_OF
 from trajcli.planners.flying_by import FlownChain
 from trajcli.planners.planner import Planned, PlannedMove
-from trajcli.planning.retime import with_duration
+from trajcli.planning.retime import slow_to_limits, with_duration
 from trajcli.trajectory import State
 
 Cap = tuple[int, str, int]
@@ -28,7 +28,8 @@ class Adaptation:
         caps: Magnitudes within which they are planned, SI.
         stretches: How many times longer a move lasts behind that, by its index.
         period: Of rows on which the breaks of their curves shall fall, s; None for any.
-        known: Moves that were planned already, with all that they depend on.
+        known: Moves that were planned already, with all that they depend on, their rows too.
+        fastest: Likewise, as their planners and limits make them, by `key`.
         chains: Chains that fly by corners, likewise, before they are stretched.
     """
 
@@ -36,7 +37,31 @@ class Adaptation:
     stretches: Mapping[int, float] = field(default_factory=dict)
     period: float | None = None
     known: dict[Any, PlannedMove] = field(default_factory=dict)
+    fastest: dict[Any, PlannedMove] = field(default_factory=dict)
     chains: dict[Any, FlownChain] = field(default_factory=dict)
+
+    @property
+    def changes_nothing(self) -> bool:
+        """Whether moves are planned as their limits alone say."""
+        return not self.caps and not self.stretches and self.period is None
+
+    def note_repeated(self, before: int, move: int, start: State, grid: tuple[float, bool]) -> None:
+        """Note that a move is the same motion as one before, with the same start and nothing changed."""
+        for noted, key, other in (
+            (self.known, self.whole_key(before, start, grid), self.whole_key(move, start, grid)),
+            (self.fastest, self.key(before, start), self.key(move, start)),
+        ):
+            if key in noted:
+                noted[other] = replace(noted[key], index=move)
+
+    def where_slowed(self) -> Adaptation:
+        """Return what is known of moves that nothing changed, slowed where they are over a limit."""
+        slowed = {
+            key: slow_to_limits(replace(move, over_limit="slow"))
+            for key, move in self.fastest.items()
+            if move.planner.when_over_limit is None
+        }
+        return Adaptation(fastest=slowed, chains=self.chains)
 
     def tightens(self, move: int) -> bool:
         """Return whether a limit of a move is tightened."""

@@ -187,7 +187,7 @@ def _plan_moves(
         try:
             with _errors_of(loaded, index, planner, begun):
                 there = placed(loaded, planner, robot, state.position, standing)
-                move = known.move(index, motion, poses) if adapted is None else None
+                move = _repeated(loaded, index, start, motion, known, poses, adapted)
                 if move is None:
                     reachable = there.with_joint_targets(partial(resolve, index=index), state.position)
                     with _points_of_errors(loaded, index):
@@ -213,6 +213,23 @@ def _plan_moves(
         raise MissingLimitError(*_without_repeats(lacking))
     _require_start_acceleration(loaded, moves)
     return moves
+
+
+def _repeated(
+    loaded: LoadedJob,
+    index: int,
+    start: State,
+    motion: tuple[object, ...],
+    known: KnownMoves,
+    poses: dict[int | None, ResolvedPose],
+    adapted: Adaptation | None,
+) -> PlannedMove | None:
+    """Return a move that is the same motion as one before; None where none is."""
+    move = known.move(index, motion, poses) if adapted is None or adapted.changes_nothing else None
+    if move is not None and adapted is not None:
+        grid = (loaded.job.output.rate, loaded.job.output.align)
+        adapted.note_repeated(known.moves[motion][0].index, index, start, grid)
+    return move
 
 
 _TAKEN_UP = 1e-6  # rad/s^2 or m/s^2, and relative: what rounding leaves of an acceleration at the start

@@ -159,14 +159,15 @@ def plan_move_within(
     """
     job = loaded.job
     key = None if adapted is None else adapted.key(index, start)
-    move = None if adapted is None else adapted.known.get(key)
+    move = None if adapted is None else adapted.fastest.get(key)
     if move is None:
         move = _fastest(index, planner, start, robot, planner.when_over_limit or job.when_over_limit)
-    if adapted is not None and move.over_limit == "slow" and not planner.handles:
-        adapted.known[key] = move
-        move = adapted.stretched(move)
-        if adapted.period is not None:
-            move = _on_rows(move, adapted.period) or move
+    if adapted is not None and not planner.handles:
+        adapted.fastest[key] = move
+        if move.over_limit == "slow":
+            move = adapted.stretched(move)
+            if adapted.period is not None:
+                move = _on_rows(move, adapted.period) or move
     if job.output.align:
         from trajcli.planning.retime import align_to_period
 

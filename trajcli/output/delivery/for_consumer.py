@@ -6,7 +6,7 @@ tighter limits, or with the breaks of its curves on rows, whichever lasts less.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
@@ -45,8 +45,8 @@ _COARSE = 0.05  # of a limit: what decimals alone may make up between knots
 _PERIODS = 200  # periods by which a motion is stretched as a whole, one after the other
 _FEW_PERIODS = 32  # likewise, where nothing else was found
 _FEW_THROUGH_ZONES = 16  # likewise, where corners are flown by
-_FEW_MOVES = 100
 _BY_RULE = 3.0  # times a limit of a rule: what passes it by more is a step, as of a start in motion
+_ENOUGH = 1e-6  # relative: a motion that lasts longer by less than that needs no other beside it
 _LONGER = 1e-9  # relative: a duration that differs by less is the same
 
 
@@ -257,16 +257,21 @@ class _Search:
     ) -> None:
         self._loaded, self._profile, self._writing, self._carried = loaded, profile, writing, carried
         self._shortest: float | None = None
+        self._first: ForConsumer | None = None
         self._begun = Adaptation()  # what it knows of moves, all that are adapted know
 
     def first(self) -> ForConsumer:
-        """Return the plan as it is without its consumer; chains through zones are kept for what follows.
+        """Return the plan as it is without its consumer; its moves are kept for what follows."""
+        made = self._first = self.attempt(self._loaded, self._begun, rules=True)
+        return made
 
-        Of many moves those that repeat are planned once, which goes before that.
-        """
-        job = self._loaded.job
-        kept = self._begun if job.names_zones and len(job.moves) <= _FEW_MOVES else None
-        return self.attempt(self._loaded, kept, rules=True)
+    def _begins(self, loaded: LoadedJob, adapted: Adaptation) -> ForConsumer:
+        """Return the plan of a job with rows that it may have, before anything is tightened."""
+        first = self._first
+        if first is None or loaded is not self._loaded or adapted is not self._begun:
+            return self.attempt(loaded, adapted)
+        over = first.joined is not None and any(finding.limit for finding in first.joined.findings)
+        return replace(first, rules=None) if over else first
 
     def attempt(
         self, loaded: LoadedJob, adapted: Adaptation | None = None, *, rules: bool = False
@@ -317,9 +322,7 @@ class _Search:
         # to search a motion through zones anew within each tighter limit takes seconds
         for stretched in (True, False) if self._loaded.job.names_zones else (False,):
             if stretched or best is None:
-                for loaded, adapted in self._candidates(first):
-                    with suppress(TrajcliError):
-                        best = self._tightened(loaded, adapted, best, stretched=stretched) or best
+                best = self._best_of([*self._candidates(first)], first, stretched=stretched)
         best = self._stretched(first, best) or best
         if best is None:
             return first
@@ -328,6 +331,26 @@ class _Search:
             return _with_event(best, "for_consumer", f"{best.where}: its breaks fall on rows")
         text = f"{best.where}: stretched {longer:.6g} times so that its rows, joined, keep all limits"
         return _with_event(best, "slowed", text)
+
+    def _best_of(
+        self, candidates: Sequence[tuple[LoadedJob, Adaptation]], first: ForConsumer, *, stretched: bool
+    ) -> ForConsumer | None:
+        """Return the shortest motion of some candidates, of two that last as long that of the earlier one.
+
+        Breaks on rows do least harm: such a motion is found soon, and ends the search of others early.
+        """
+        best, rank, enough = None, 0, first.plan.trajectory.duration * (1 + _ENOUGH)
+        order = sorted(range(len(candidates)), key=lambda number: -_breaks_on_rows(*candidates[number]))
+        for number in order:
+            longest = np.inf if best is None else best.plan.trajectory.duration
+            if longest <= enough:
+                break
+            if number > rank:
+                longest = np.nextafter(longest, 0.0)
+            with suppress(TrajcliError):
+                made = self._tightened(*candidates[number], longest, stretched=stretched)
+                best, rank = (best, rank) if made is None else (made, number)
+        return best
 
     def _candidates(self, first: ForConsumer) -> Iterator[tuple[LoadedJob, Adaptation]]:
         """Yield jobs with rows that they may have, and how their moves are planned."""
@@ -354,7 +377,7 @@ class _Search:
         from trajcli.output.delivery.stretched_moves import StretchedMoves
 
         duration, rate = first.plan.trajectory.duration, first.grid.rate
-        by_move = StretchedMoves(first.rows, rate, self._begun.known)
+        by_move = StretchedMoves(first.rows, rate, self._begun.fastest)
         longest = np.inf if best is None else best.plan.trajectory.duration
         most = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
         for periods in range(1, min(most, _FEW_THROUGH_ZONES) if self._loaded.job.names_zones else most):
@@ -378,22 +401,22 @@ class _Search:
         return replace(self._loaded, job=self._loaded.job.model_copy(update={"output": output}))
 
     def _tightened(
-        self, loaded: LoadedJob, adapted: Adaptation, best: ForConsumer | None, *, stretched: bool = False
+        self, loaded: LoadedJob, adapted: Adaptation, longest: float, *, stretched: bool = False
     ) -> ForConsumer | None:
         """Return a motion whose rows keep all, within tighter limits where that is needed.
 
         Args:
             loaded: The job.
             adapted: How its moves are planned.
-            best: The shortest that is known; one that lasts longer is of no use.
+            longest: One that lasts longer is of no use, s.
             stretched: Whether moves are stretched only.
         """
         from trajcli.output.delivery.tightening import tightened
 
         for count in range(_ROUNDS):
             report_progress(f"planning for {self._profile.name}, round {count + 1}")
-            made = self.attempt(loaded, adapted)
-            if best is not None and made.plan.trajectory.duration >= best.plan.trajectory.duration:
+            made = self.attempt(loaded, adapted) if count else self._begins(loaded, adapted)
+            if made.plan.trajectory.duration > longest:
                 return None
             if made.clean or not made.plan.verdict.passed:
                 return made if made.clean else None
@@ -422,7 +445,7 @@ class _Search:
             yield f"`{' '.join(options)}`{instead} keeps all limits, with {duration:.6g} s as now"
         job = self._loaded.job.model_copy(update={"when_over_limit": "slow"})
         slow = _Search(replace(self._loaded, job=job), self._profile, self._writing, self._carried)
-        slow._begun = Adaptation(chains=self._begun.chains)
+        slow._begun = self._begun.where_slowed()
         slower = slow.slower(first)
         if slower.keeps:
             duration = slower.plan.trajectory.duration
@@ -438,6 +461,11 @@ class _Search:
             yield "--rows rate"
         if wanted.align and document.node(("output", "align")) is not None:
             yield "--set output.align=true"
+
+
+def _breaks_on_rows(loaded: LoadedJob, adapted: Adaptation) -> int:
+    """Return 2 for rows at the breaks of a curve, 1 where its breaks are moved onto rows, else 0."""
+    return 2 if loaded.job.output.rows == "knots" else int(adapted.period is not None)
 
 
 def _in_its_move(found: Finding, plan: Plan) -> Finding:
