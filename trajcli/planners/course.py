@@ -9,6 +9,7 @@ Source: Biagiotti and Melchiorri (2008), section 9.5.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import numpy as np
 
@@ -24,6 +25,10 @@ _SAMPLES = 9  # of a path, its ends included
 _BEND = 0.9  # of an acceleration, or of a jerk, that a bend of the path may take
 _LEFT = 0.1  # of a jerk that is left for the law
 _TINY = 1e-12  # of the largest derivative: less is rounding
+
+
+BoundsAbout = Callable[[Array], Array]
+"""Bounds of a law about states (N, 2): lower and upper ones of sd, sdd and sddd, (N, 6)."""
 
 
 @frozen
@@ -116,9 +121,9 @@ class Course(ABC):
         joints = self.curve.evaluate_orders(np.clip(s, 0.0, self.length), (1, 2, 3)).transpose(1, 0, 2)
         return PathRates(joints, self.tool_rates(s) if self.limits_tool else None)
 
-    def bounds(self, rates: PathRates, states: Array) -> Array:
-        """Return bounds of its law where it has such rates, about states (N, 2), (N, 6), as `law_bounds`."""
-        return law_bounds(rates, self.robot.limits, self.tcp, states)
+    def bounds(self, rates: PathRates) -> BoundsAbout:
+        """Return the bounds of its law where it has such rates, as `law_bounds`."""
+        return law_bounds(rates, self.robot.limits, self.tcp)
 
     def typical_bounds(self, low: float, high: float) -> Array:
         """Return the bounds of one variable that stand for those from one s to another, (6,).
@@ -126,7 +131,7 @@ class Course(ABC):
         They are the geometric means of those at some s, exact where they are the same everywhere.
         """
         some = np.linspace(low, high, 1 if self.uniform else _SAMPLES).tolist()
-        rows = np.concatenate([self.bounds(self.rates(np.array([s])), np.zeros((1, 2))) for s in some])
+        rows = np.concatenate([self.bounds(self.rates(np.array([s])))(np.zeros((1, 2))) for s in some])
         sizes = np.abs(rows)
         with np.errstate(divide="ignore"):
             means = np.exp(np.log(sizes).mean(axis=0))
@@ -138,39 +143,38 @@ class Course(ABC):
         return (*tool, *path_constraints(path, self.robot))
 
 
-def law_bounds(rates: PathRates, limits: Limits, tcp: ToolLimits, states: Array) -> Array:
-    """Return bounds of a law under which all limits are kept where it has given speeds.
+def law_bounds(rates: PathRates, limits: Limits, tcp: ToolLimits) -> BoundsAbout:
+    """Return the bounds of a law under which all limits are kept where it has given speeds.
 
     Args:
         rates: Of the path, at m values of s: the tightest count.
         limits: Of the joints.
         tcp: Of the tool.
-        states: sd and sdd, about which the terms of bends are taken, (N, 2).
-
-    Returns:
-        Lower and upper bounds of sd, sdd and sddd, (N, 6); infinite for none.
     """
     first, second, third = rates.joints
     low, high = limits.acceleration.T
     jerk = np.abs(limits.jerk).min(axis=1)
     size = np.where(np.abs(first) > _TINY * np.abs(first).max(), np.abs(first), 0.0)
-    ahead = first > 0
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         top = _largest_speed(rates, limits, tcp, size)
+    sign = np.where(first > 0, 1.0, -1.0)
+    ends = np.where(sign > 0, -low, high), np.where(sign > 0, high, -low)
+    thrice, unlimited, left = 3 * second, np.isinf(jerk), _LEFT * jerk
+
+    def about(states: Array) -> Array:
         speed, change = np.minimum(states[:, 0], top)[:, None, None], states[:, 1, None, None]
-        bent = second * speed**2
-        upper = np.where(ahead, high - bent, bent - low) / size
-        lower = np.where(ahead, bent - low, high - bent) / size
-        used = np.where(ahead, 1.0, -1.0) * (3 * second * speed * change + third * speed**3)
-        left = [
-            np.where(np.isinf(jerk), np.inf, np.maximum(jerk + sign * used, _LEFT * jerk)) / size
-            for sign in (1, -1)
-        ]
-        rows = [_least_of(each) for each in (lower, upper, *left)]
-        if rates.tool is not None:
-            rows = _with_tool(rates.tool, tcp, states, rows)
-    top_row, sizes = np.full(len(states), top), np.maximum(rows, 0.0)
-    return np.stack([-top_row, top_row, -sizes[0], sizes[1], -sizes[2], sizes[3]], axis=1)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            bent = sign * (second * speed**2)
+            used = sign * (thrice * speed * change + third * speed**3)
+            jerks = [np.where(unlimited, np.inf, np.maximum(jerk + each, left)) for each in (used, -used)]
+            sides = np.stack([ends[0] + bent, ends[1] - bent, *jerks]) / size
+            rows = list(np.fmin.reduce(sides, axis=(2, 3), initial=np.inf))  # 0 / 0 bounds nothing
+            if rates.tool is not None:
+                rows = _with_tool(rates.tool, tcp, states, rows)
+        top_row, sizes = np.full(len(states), top), np.maximum(rows, 0.0)
+        return np.stack([-top_row, top_row, -sizes[0], sizes[1], -sizes[2], sizes[3]], axis=1)
+
+    return about
 
 
 def _largest_speed(rates: PathRates, limits: Limits, tcp: ToolLimits, size: Array) -> float:
@@ -192,11 +196,6 @@ def _largest_speed(rates: PathRates, limits: Limits, tcp: ToolLimits, size: Arra
             np.sqrt(_BEND * tcp.angular_acceleration / tool[3]),
         ]
     return min(float(np.where(np.isnan(row), np.inf, row).min()) for row in rows)
-
-
-def _least_of(rows: Array) -> Array:
-    """Return the least (N,) of rows (N, m, n), those that are no numbers left out."""
-    return np.asarray(np.where(np.isnan(rows), np.inf, rows).min(axis=(1, 2)))
 
 
 def _with_tool(tool: Array, tcp: ToolLimits, states: Array, rows: list[Array]) -> list[Array]:

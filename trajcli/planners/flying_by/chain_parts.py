@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
+from trajcli.planners.course import BoundsAbout
 from trajcli.planners.fastest_through_points.state_times import (
     common_duration,
     fastest_durations,
@@ -27,9 +27,6 @@ _FINE = 2.0**-26  # of the largest speed: the grid of speeds, between whose poin
 _GRID = 2.0**-22  # of the bounds, to which states are rounded: last bits of processors do not show
 _SHORT = 0.4  # of a grid's size: its inner states
 _ACCELERATION_ALONE = np.array([[0.0, -1.0], [0.0, 1.0]])
-
-BoundsAbout = Callable[[Array], Array]
-"""Bounds of a law about states (N, 2): lower and upper ones of sd, sdd and sddd, (N, 6)."""
 
 
 @frozen

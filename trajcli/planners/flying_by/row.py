@@ -10,9 +10,9 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits
-from trajcli.planners.course import Course, law_bounds
+from trajcli.planners.course import BoundsAbout, Course, law_bounds
 from trajcli.planners.flying_by.between_stops import CornerZone, FlyByChain
-from trajcli.planners.flying_by.chain_parts import BorderNode, BoundsAbout, ChainPart, PathPart, ZonePart
+from trajcli.planners.flying_by.chain_parts import BorderNode, ChainPart, PathPart, ZonePart
 
 
 @frozen
@@ -105,10 +105,10 @@ def _border(chain: FlyByChain, number: int, course: Course, eased: float, *, lea
     s, tempo = (corner.left, chain.tempos[number]) if leads else (corner.joined, chain.tempos[number + 1])
     tempo *= eased
     rates, limits = course.rates(np.array([s])), corner.limits
+    along, inside = course.bounds(rates), law_bounds(rates, limits, limits.tcp)
 
     def bounds(states: Array) -> Array:
-        on_path = slowed(course.bounds(rates, states / [tempo, tempo**2]), tempo)
-        return _tighter(on_path, law_bounds(rates, limits, limits.tcp, states))
+        return _tighter(slowed(along(states / [tempo, tempo**2]), tempo), inside(states))
 
     return BorderNode(_same_everywhere(bounds) if course.uniform else bounds, leads=leads, goes_on=not leads)
 

@@ -13,7 +13,7 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion, motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.robot import Robot, ToolLimits
-from trajcli.planners.course import Course, PathRates, law_bounds
+from trajcli.planners.course import BoundsAbout, Course, PathRates, law_bounds
 from trajcli.planners.tool_constraint import ToolConstraint
 from trajcli.planners.tool_path.follow import FollowedPath
 from trajcli.planners.tool_path.law import LawSpec
@@ -94,15 +94,21 @@ class ToolCourse(Course):
         speed, angular_speed = np.min(sides, axis=(0, 2)).tolist()
         return replace(rates, speeds=(speed, angular_speed))
 
-    def bounds(self, rates: PathRates, states: Array) -> Array:
-        """Return bounds of its law where it has such rates, (N, 6), with the deceleration that it names."""
+    def bounds(self, rates: PathRates) -> BoundsAbout:
+        """Return the bounds of its law where it has such rates, with the deceleration that it names."""
         tcp = self.tcp
         if rates.speeds is not None:
             tcp = replace(tcp, speed=rates.speeds[0], angular_speed=rates.speeds[1])
-        bounds = law_bounds(rates, self.robot.limits, tcp, states)
-        if self.law.deceleration is not None:
-            bounds[:, 2] = np.maximum(bounds[:, 2], -self.law.deceleration)
-        return bounds
+        about, deceleration = law_bounds(rates, self.robot.limits, tcp), self.law.deceleration
+        if deceleration is None:
+            return about
+
+        def slowing(states: Array) -> Array:
+            bounds = about(states)
+            bounds[:, 2] = np.maximum(bounds[:, 2], -deceleration)
+            return bounds
+
+        return slowing
 
     def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
         """Return the reference of the tool under a law s(t)."""
