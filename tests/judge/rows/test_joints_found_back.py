@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from planned_examples import planned_with_output
 from two_moves import TWO_MOVES
 
 from trajcli.errors import PlanningError
-from trajcli.job.read import job_from_text
 from trajcli.judge.rows.tool_rows import joints_found_back
 from trajcli.output.write import write_plan
-from trajcli.planning.plan import Plan, plan_job
+from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
 
 TOOLS = """
@@ -31,9 +30,8 @@ moves:
 """
 
 
-@cache
 def planned(job: str, columns: str) -> Plan:
-    return plan_job(job_from_text(f"{job}output: {{rate: 50, columns: {columns}}}\n"))
+    return planned_with_output(job, f"{{rate: 50, columns: {columns}}}")
 
 
 def found(plan: Plan, folder: Path, stretch: float = 1.0) -> tuple[np.ndarray, list[np.ndarray]]:

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from planned_examples import planned_with_output
 from tiers import few
 from two_moves import TWO_MOVES as JOB
 
 from trajcli.columns import group_of, parse_column
 from trajcli.errors import InputError
 from trajcli.findings import Finding
-from trajcli.job.read import job_from_text
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.output.write import write_plan
-from trajcli.planning.plan import Plan, plan_job
+from trajcli.planning.plan import Plan
 
 Rows = NDArray[np.float64]
 EVERYTHING = "[t, q, qd, qdd, pose, twist, twistd, path, move]"
@@ -26,8 +26,7 @@ ALONE = ("[t, pose]", "[t, pose, twist]", "[t, twist, twistd]", "[t, twist]", "[
 
 
 def planned(columns: str, rate: int = 100) -> Plan:
-    text = f"{JOB}output: {{rate: {rate}, columns: {columns}}}\n"
-    return plan_job(job_from_text(text))
+    return planned_with_output(JOB, f"{{rate: {rate}, columns: {columns}}}")
 
 
 def written(plan: Plan, file: Path) -> tuple[list[str], Rows]:
