@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,13 +30,15 @@ def planned_with_output(text: str, output: str) -> Plan:
     return replace(_planned_text(text), loaded=job_from_text(f"{text}output: {output}\n"))
 
 
-def planned_once(loaded: LoadedJob, carried: Carried | None = None, *, advise: bool = True) -> Plan:
+def planned_once(
+    loaded: LoadedJob, carried: Carried | None = None, *, advise: bool = True, **adapted: Any
+) -> Plan:
     """Return the plan of a job; of the same text, read from the same place with the same options, always the same.
 
     Of jobs that say other rows alone the motion is the same, too.
     """
-    if carried is not None:
-        return plan_job(loaded, carried, advise=advise)
+    if carried is not None or adapted:
+        return plan_job(loaded, carried, advise=advise, **adapted)
     output = loaded.job.output
     rows = {"columns": None, "times": None, "rows": None} | ({} if output.align else {"rate": None})
     motion = loaded.job.model_copy(update={"output": output.model_copy(update=rows)})

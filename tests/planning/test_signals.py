@@ -79,10 +79,12 @@ def test_a_signal_along_a_path_is_set_where_the_tool_has_gone_so_far() -> None:
     assert np.linalg.norm(end - late) == pytest.approx(0.01, abs=2e-6)
 
 
-def test_about_a_corner_the_tool_enters_is_nearest_and_leaves() -> None:
+@pytest.mark.parametrize("jerk", [None, pytest.param(8000, marks=pytest.mark.full)])
+def test_about_a_corner_the_tool_enters_is_nearest_and_leaves(jerk: float | None) -> None:
     some = [at("leave"), at("nearest"), at("enter"), at({"path": 30}), at({"path": -5})]
-    plan = planned(line(0, 0, 80, zone=20, at=some), line(80, 0, 0))
-    corner = planned(line(0, 0, 80), line(80, 0, 0))
+    limits = {"acceleration": 800, "jerk": jerk}
+    plan = planned(line(0, 0, 80, zone=20, at=some), line(80, 0, 0), limits=limits)
+    corner = planned(line(0, 0, 80), line(80, 0, 0), limits=limits)
     where = tool(corner, corner.moves[0].duration)[0]
     on_path, enter, inside, nearest, leave = times_of(plan)
     distances = np.linalg.norm(tool(plan, enter, nearest, leave) - where, axis=1)

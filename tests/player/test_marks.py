@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from planned_examples import planned_example
 
+from trajcli.job.read import job_from_text
 from trajcli.kinematics.forward import forward
+from trajcli.planning.plan import plan_job
 from trajcli.player.scene import scene_of_plan
 
 
@@ -38,8 +40,31 @@ def test_points_have_their_names(cell: dict[str, Any]) -> None:
     assert set(names) == {"home", "above_pick", "pick", "above_place", "place"}
 
 
-def test_signals_and_the_entries_that_set_them() -> None:
-    scene = scene_of_plan(planned_example("signals"))
+GLUE = """
+version: 1
+units: {angle: deg, length: mm}
+robot: ur5e
+limits: {acceleration: 800, jerk: null}
+defaults: {law: {speed: 150}}
+start: {joints: [0, -90, 90, -90, -90, 0]}
+moves:
+  - {planner: quintic, to: {from: here, offset: {xyz: [0, 0, 60]}}, at: {signal: pressure, value: 2.5, before: 0.2}}
+  - planner: line
+    to: {from: here, offset: {xyz: [120, 0, 0]}}
+    at:
+      - {signal: glue, value: 1, when: {path: 10}, before: 20 ms}
+      - {signal: glue, value: 0.6, when: {path: 60}}
+      - {signal: glue, value: 1, when: {path: 90}}
+  - {planner: line, to: {from: here, offset: {xyz: [0, 80, 0]}}, at: {signal: glue, value: 0, when: {path: -10}}}
+  - {signal: pressure, value: 0}
+  - {planner: quintic, to: {from: here, offset: {xyz: [0, 0, -60]}}}
+"""
+"""As examples/signals.yaml, which takes seconds to fly by its corner."""
+
+
+@pytest.mark.parametrize("name", [None, pytest.param("signals", marks=pytest.mark.full)])
+def test_signals_and_the_entries_that_set_them(name: str | None) -> None:
+    scene = scene_of_plan(plan_job(job_from_text(GLUE)) if name is None else planned_example(name))
     pressure, glue = scene["signals"]
     assert [change["value"] for change in pressure["changes"]] == [2.5, 0]
     assert [change["value"] for change in glue["changes"]] == [1, 0.6, 1, 0]
