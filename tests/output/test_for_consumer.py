@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,8 +19,8 @@ from tiers import few
 import trajcli
 from trajcli.curves.operations import scale_time
 from trajcli.errors import VerificationError
-from trajcli.grids import UniformGrid
-from trajcli.job.read import load_job
+from trajcli.grids import KnotGrid, UniformGrid
+from trajcli.job.read import job_from_text, load_job
 from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.delivery.stretched_moves import StretchedMoves
@@ -111,12 +113,12 @@ def _said_to_be_over(name: str, factors: Sequence[float], none: Sequence[float])
     """Return how many of these stretches are said to be over; they are, by scipy's curves, and none of others is."""
     loaded = load_job(str(EXAMPLES / f"{name}.yaml"), ("when_over_limit=slow", "output.align=true"))
     known: dict[Any, PlannedMove] = {}
-    plan = plan_job(loaded, adapted=Adaptation(known=known))
+    plan = plan_job(loaded, adapted=Adaptation(fastest=known))
     rows = JoinedRows(plan, grid_of(plan), ("t", "q", "qd", "qdd"), exact=True)
     moves, said = StretchedMoves(rows, loaded.job.output.rate, known), 0
     for factor in factors:
         stretches = dict.fromkeys(range(len(loaded.job.moves)), factor)
-        slower = plan_job(loaded, adapted=Adaptation(stretches=stretches, known=known))
+        slower = plan_job(loaded, adapted=Adaptation(stretches=stretches, fastest=known))
         if moves.are_over(factor):
             assert largest_share(slower, grid_of(slower), 1e-4) > 1 + WITHIN
             said += 1
@@ -204,6 +206,36 @@ def _attempts(monkeypatch: pytest.MonkeyPatch, name: str, profile: str) -> tuple
     with np.errstate(all="ignore"), pytest.raises(VerificationError) as refused:
         plan_for(*job_for(loaded, profile, {}), Writing())
     return refused.value.problems[0].hint or "", len(planned)
+
+
+@pytest.mark.parametrize("when", few(["error", "slow"], 1))
+def test_moves_are_planned_once_for_whatever_rows_are_tried(
+    when: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six moves, of which the first one starts otherwise: their rows pass a limit, those at knots do not."""
+    from trajcli.planners.point_to_point.jerk_limited import JerkLimited
+
+    planned, plan = list[None](), JerkLimited.plan
+
+    def counted(*given: Any) -> Any:
+        planned.append(None)
+        return plan(*given)
+
+    monkeypatch.setattr(JerkLimited, "plan", counted)
+    there, back = (
+        {"planner": "jerk_limited", "to": {"joints": [joint] * 6}, "limits": {"acceleration": 9, "jerk": 90}}
+        for joint in (0.7, 0.0)
+    )
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "start": {"joints": [0.0] * 6},
+        "moves": [{"repeat": 3, "moves": [there, back]}],
+    }
+    loaded = job_from_text(json.dumps(job | {"when_over_limit": when, "output": {"rate": 50}}))
+    with suppress(VerificationError):
+        assert isinstance(plan_for(*job_for(loaded, "ros-jtc", {}), Writing()).grid, KnotGrid)
+    assert len(planned) == 3
 
 
 @pytest.mark.full
