@@ -87,13 +87,16 @@ def _waypoints(folder: Path) -> list[Figure]:
     )
     (folder / "points.csv").write_text("t,q1,q2,q3,q4,q5,q6\n" + "\n".join(rows) + "\n")
     start = ", ".join(map(str, _points(1)[0]))
-    job = folder / "waypoints.yaml"
     head = "version: 1\nrobot: {joints: 6}\nlimits: {velocity: 1e6, acceleration: 1e9}\noutput: {rate: 1}\n"
-    move = "  - {planner: spline, rule: clamped, through: {csv: points.csv}}\n"
-    job.write_text(f"{head}start: {{joints: [{start}]}}\nmoves:\n{move}")
-    runs = compete({"ours": _trajcli("plan", "-q", str(job))}, repeats=1)
-    name = f"peak memory, spline through {WAYPOINTS} points"
-    return [Figure(name, "nothing", runs["ours"].peaks, [0.0], 400 * MEGABYTE, kind="memory")]
+    figures = []
+    for rule in ("continuous_acceleration", "clamped"):
+        job = folder / f"{rule}.yaml"
+        move = f"  - {{planner: spline, rule: {rule}, through: {{csv: points.csv}}}}\n"
+        job.write_text(f"{head}start: {{joints: [{start}]}}\nmoves:\n{move}")
+        peaks = compete({"ours": _trajcli("plan", "-q", str(job))}, repeats=1)["ours"].peaks
+        name = f"peak memory, spline {rule} through {WAYPOINTS} points"
+        figures.append(Figure(name, "nothing", peaks, [0.0], 400 * MEGABYTE, kind="memory"))
+    return figures
 
 
 def _job(file: Path, planner: str, count: int) -> str:

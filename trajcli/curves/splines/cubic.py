@@ -107,15 +107,15 @@ def cubics(times: Array, positions: Array, velocities: Array, acceleration: Arra
         acceleration: At each knot, shape (m, n).
     """
     coefficients = np.empty((4, *positions.shape))
-    _fill(coefficients, np.diff(times), positions, velocities, acceleration)
+    fill_pieces(coefficients, np.diff(times), positions, velocities, acceleration)
     coefficients.flags.writeable = False  # the curve takes it without a copy
     return PiecewisePolynomial(times, coefficients)
 
 
-def _fill(
+def fill_pieces(
     coefficients: Array, lengths: Array, positions: Array, velocities: Array, acceleration: Array
 ) -> None:
-    """Write the pieces that start in given states into `coefficients` (4, pieces, n)."""
+    """Write the pieces of `cubics` with lengths (m - 1,) into `coefficients` (4, m - 1, n)."""
     np.subtract(acceleration[1:], acceleration[:-1], out=coefficients[0])
     coefficients[0] /= lengths[:, None]
     coefficients[0] /= 6
@@ -200,7 +200,7 @@ def _curve(points: Waypoints, outer: tuple[Array | None, Array | None], end: _En
     """Return the spline with the given velocities at its ends, and `end` where there is none."""
     coefficients = np.empty((4, points.count - 1, points.positions.shape[1]))
     last = _solve(coefficients[1], points, outer, end)
-    _make_pieces(coefficients, points, last, outer[0])
+    make_pieces(coefficients, points, last, outer[0])
     coefficients.flags.writeable = False  # the curve takes it without a copy
     return PiecewisePolynomial(points.times, coefficients)
 
@@ -210,7 +210,7 @@ def _solve(
 ) -> Array:
     """Write the acceleration at all knots but the last, (m - 1, n), and return that of the last, (n,)."""
     last: Array = np.empty(points.positions.shape[1])
-    for columns in _columns(*points.positions.shape):
+    for columns in solved_together(*points.positions.shape):
         part = Waypoints(points.times, points.positions[:, columns])
         velocities = [None if velocity is None else velocity[columns] for velocity in outer]
         solved = _accelerations(part, velocities, end)
@@ -218,7 +218,7 @@ def _solve(
     return last
 
 
-def _make_pieces(coefficients: Array, points: Waypoints, last: Array, first: Array | None) -> None:
+def make_pieces(coefficients: Array, points: Waypoints, last: Array, first: Array | None) -> None:
     """Write the pieces between the knots into `coefficients` (4, m - 1, n), some after the others.
 
     Args:
@@ -236,11 +236,11 @@ def _make_pieces(coefficients: Array, points: Waypoints, last: Array, first: Arr
         starting = starting_velocities(part, acceleration)
         if row == 0 and first is not None:
             starting[0] = first
-        _fill(coefficients[:, pieces], part.lengths, part.positions[:-1], starting, acceleration)
+        fill_pieces(coefficients[:, pieces], part.lengths, part.positions[:-1], starting, acceleration)
 
 
-def _columns(count: int, components: int) -> list[slice]:
-    """Return the components that are solved together, so that memory hardly grows with their number."""
+def solved_together(count: int, components: int) -> list[slice]:
+    """Return components of so many points that are solved together: memory hardly grows with their number."""
     width = max(1, _VALUES // count)
     return [slice(k, k + width) for k in range(0, components, width)]
 

@@ -12,6 +12,8 @@ Source: Siciliano et al. (2009), section 4.2.1; the same curve, with other unkno
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -19,9 +21,11 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
 from trajcli.curves.splines.cubic import (
     KnotEquations,
     cubics,
+    fill_pieces,
     knot_accelerations,
     knot_equations,
-    starting_velocities,
+    make_pieces,
+    solved_together,
     without_acceleration,
 )
 from trajcli.curves.splines.slopes import Waypoints
@@ -102,6 +106,10 @@ class _EndState:
     velocity: Array
     acceleration: Array
 
+    def of(self, columns: slice) -> _EndState:
+        """Return the state of some components."""
+        return _EndState(self.position[columns], self.velocity[columns], self.acceleration[columns])
+
     def backwards(self) -> _EndState:
         return _EndState(self.position, -self.velocity, self.acceleration)
 
@@ -152,24 +160,54 @@ class _EndInterval:
 
 
 def _many_pieces(points: Waypoints, virtual: Array, first: _EndState, last: _EndState) -> PiecewisePolynomial:
-    """Return the curve through three points or more."""
+    """Return the curve through three points or more: two pieces at either end, those of a spline between."""
+    times, positions = points.times, points.positions
+    coefficients = np.empty((4, points.count + 1, positions.shape[1]))
+    inner = coefficients[:, 2:-2]
+    beside, leaving = _solve(inner[1], points, virtual, first, last)
+    if points.count > 3:
+        make_pieces(inner, Waypoints(times[1:-1], positions[1:-1]), beside[1], None)
+    head, tail = _end_intervals(points, virtual, first, last)
+    early, late = head.virtual_state(beside[0]), tail.virtual_state(beside[1]).backwards()
+    from_last = _EndState(positions[-2], leaving, beside[1])
+    knots = np.concatenate([times[:1], virtual[:1], times[1:-1], virtual[1:], times[-1:]])
+    ends = (coefficients[:, :2], knots[:3]), (coefficients[:, -2:], knots[-3:])
+    states = _stacked((first, early), beside[0]), _stacked((from_last, late), last.acceleration)
+    for (pieces, times_there), at in zip(ends, states, strict=True):
+        fill_pieces(pieces, np.diff(times_there), *at)
+    coefficients.flags.writeable = False  # the curve takes it without a copy
+    return PiecewisePolynomial(knots, coefficients)
+
+
+def _solve(
+    acceleration: Array, points: Waypoints, virtual: Array, first: _EndState, last: _EndState
+) -> tuple[Array, Array]:
+    """Write the accelerations at the inner waypoints but the last one, (m - 3, n).
+
+    Returns:
+        Those at the first and the last of them, (2, n), and the velocity that leaves the last one, (n,).
+    """
+    beside, leaving = np.empty((2, points.positions.shape[1])), np.empty(points.positions.shape[1])
+    for columns in solved_together(*points.positions.shape):
+        part = Waypoints(points.times, points.positions[:, columns])
+        head, tail = _end_intervals(part, virtual, first.of(columns), last.of(columns))
+        before, after = knot_equations(part)
+        head.eliminate(before, after)
+        tail.eliminate(after.backwards(), before.backwards())
+        solved = knot_accelerations(before, after)
+        acceleration[:, columns], beside[:, columns] = solved[1:-2], solved[[1, -2]]
+        leaving[columns] = -(after.velocity[-2] + after.stiffness[-2] * solved[-2])
+    return beside, leaving
+
+
+def _end_intervals(
+    points: Waypoints, virtual: Array, first: _EndState, last: _EndState
+) -> tuple[_EndInterval, _EndInterval]:
+    """Return the first interval, and the last one backwards in time."""
     times, positions = points.times, points.positions
     head = _EndInterval(first, virtual[0] - times[0], times[1] - virtual[0], positions[1])
-    tail = _EndInterval(last.backwards(), times[-1] - virtual[1], virtual[1] - times[-2], positions[-2])
-    before, after = knot_equations(points)
-    head.eliminate(before, after)
-    tail.eliminate(after.backwards(), before.backwards())
-    solved = knot_accelerations(before, after)
-    states = head.virtual_state(solved[1]), tail.virtual_state(solved[-2]).backwards()
-    inner = slice(1, -1)
-    starting = starting_velocities(points, solved)[inner]
-    leaving_last = -(after.velocity[-2] + after.stiffness[-2] * solved[-2])
-    return _assembled(
-        times,
-        virtual,
-        (positions[inner], np.concatenate([starting, leaving_last[None]]), solved[inner]),
-        (first, *states, last),
-    )
+    back = _EndInterval(last.backwards(), times[-1] - virtual[1], virtual[1] - times[-2], positions[-2])
+    return head, back
 
 
 def _three_pieces(
@@ -194,30 +232,13 @@ def _three_pieces(
     centres = (2 * one + two) / 3, (2 * one + two + total) / 3
     at_first = 6 / (total * (one + two)) * (centres[1] * area - moment)
     at_second = 6 / (total * (two + three)) * (moment - centres[0] * area)
-    states = first.after(one, at_first), last.backwards().after(three, at_second).backwards()
-    nothing = np.empty((0, first.position.size))
-    return _assembled(points.times, virtual, (nothing, nothing, nothing), (first, *states, last))
+    states = first, first.after(one, at_first), last.backwards().after(three, at_second).backwards()
+    knots = np.concatenate([points.times[:1], virtual, points.times[1:]])
+    return cubics(knots, *_stacked(states, last.acceleration))
 
 
-def _assembled(
-    times: Array,
-    virtual: Array,
-    inner: tuple[Array, Array, Array],
-    outer: tuple[_EndState, _EndState, _EndState, _EndState],
-) -> PiecewisePolynomial:
-    """Return the curve over first point, virtual point, real inner points, virtual point, last point.
-
-    Args:
-        times: Of the m waypoints.
-        virtual: Times of the virtual points, shape (2,).
-        inner: Position, velocity and acceleration at the inner waypoints, each (m - 2, n).
-        outer: States at the first waypoint, the two virtual points, and the last waypoint.
-    """
-    first, early, late, last = outer
-    knots = np.concatenate([times[:1], virtual[:1], times[1:-1], virtual[1:], times[-1:]])
-    positions = np.concatenate([[first.position, early.position], inner[0], [late.position]])
-    velocities = np.concatenate([[first.velocity, early.velocity], inner[1], [late.velocity]])
-    accelerations = np.concatenate(
-        [[first.acceleration, early.acceleration], inner[2], [late.acceleration, last.acceleration]]
-    )
-    return cubics(knots, positions, velocities, accelerations)
+def _stacked(states: Sequence[_EndState], last: Array) -> tuple[Array, Array, Array]:
+    """Return positions and velocities at the starts of pieces, accelerations there and, last, behind them."""
+    accelerations = [*(state.acceleration for state in states), last]
+    position, velocity = [state.position for state in states], [state.velocity for state in states]
+    return np.stack(position), np.stack(velocity), np.stack(accelerations)
