@@ -18,6 +18,15 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 SLOW = ("--set", "when_over_limit=slow")
 
 
+STEPPING = """\
+version: 1
+robot: ur5e
+limits: {acceleration: 4, jerk: null}
+start: {joints: [0, 0, 0, 0, 0, 0]}
+moves: [{planner: trapezoid, to: {joints: [0.3, 0, 0, 0, 0, 0]}, velocity: 0.5}]
+"""
+
+
 def planned(capfd: pytest.CaptureFixture[str], job: str, file: Path, *options: str) -> None:
     outcome = call(capfd, "plan", str(EXAMPLES / job), "-o", str(file), *SLOW, *options)
     assert outcome.code == 0, outcome.err
@@ -119,3 +128,18 @@ def test_rows_with_other_ends_are_planned_for_nobody(
     for lines in (slower[:-1], own):
         file.write_text("\n".join(lines) + "\n")
         assert checked(capfd, "sync.yaml", file)[1]["planned_rows"] is False
+
+
+def test_a_slower_motion_is_recognised_where_its_consumer_is_named(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What the advice of `plan --for` wrote; the job itself says nothing of slowness."""
+    job, file = tmp_path / "job.yaml", tmp_path / "rows.csv"
+    job.write_text(STEPPING, encoding="utf-8")
+    planned(capfd, str(job), file, "--for", "ur-servoj")
+    outcome = call(capfd, "check", str(file), "--job", str(job), "--for", "ur-servoj", "--json")
+    found = json.loads(outcome.out)
+    assert (outcome.code, found["planned_rows"]) == (0, True)
+    assert found["planned_with"] == "--for ur-servoj --set when_over_limit=slow"
+    other = call(capfd, "check", str(file), "--job", str(job), "--for", "ur-passthrough", "--json")
+    assert json.loads(other.out)["planned_rows"] is False

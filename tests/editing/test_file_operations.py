@@ -167,6 +167,17 @@ def test_a_cut_outside_of_the_file(ends: tuple[float, float], message: str, tmp_
         cut(read(planned(tmp_path / "rows.csv")), *ends)
 
 
+def test_the_extent_that_a_cut_names_can_be_cut(tmp_path: Path) -> None:
+    """Ten digits, of which nine would lie behind the end."""
+    t, file = np.array([0.0, 3.25, 6.851298016]), tmp_path / "rows.csv"
+    file.write_text(
+        "t,q1\n" + "".join(f"{a:.9f},{b:.9f}\n" for a, b in zip(t, t, strict=True)), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match=r"goes from 0 s to 6\.851298016 s"):
+        cut(read(file), 0.0, 9.0)
+    np.testing.assert_array_equal(cut(read(file), 0.0, 6.851298016).rows.t, t)
+
+
 def test_an_operation_that_makes_a_jump_is_noticed(tmp_path: Path) -> None:
     motion = read(planned(tmp_path / "rows.csv"))
     assert new_jumps(motion, motion) == []

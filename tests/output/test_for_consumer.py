@@ -238,6 +238,13 @@ def test_moves_are_planned_once_for_whatever_rows_are_tried(
     assert len(planned) == 3
 
 
+def test_rows_at_a_rate_and_at_knots_are_called_both() -> None:
+    loaded = load_job(str(EXAMPLES / "scara_pick.yaml"), ("output={rows: both, rate: 50}",))
+    made = plan_for(*job_for(loaded, "ros-jtc", {"rows": True}), Writing())
+    assert made.where == "for ros-jtc at 50 Hz and its knots"
+    assert isinstance(made.grid, KnotGrid)
+
+
 @pytest.mark.full
 def test_stretches_that_leave_a_step_at_the_end_of_a_move_are_not_planned(
     monkeypatch: pytest.MonkeyPatch,

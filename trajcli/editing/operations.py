@@ -49,7 +49,7 @@ def cut(motion: EditedMotion, first: float, last: float) -> EditedMotion:
     t = motion.rows.t
     for name, time in (("--from", first), ("--to", last)):
         if not t[0] - _room(motion) <= time <= t[-1] + _room(motion):
-            extent = f"{motion.rows.source} goes from {t[0]:.9g} s to {t[-1]:.9g} s"
+            extent = f"{motion.rows.source} goes from {t[0]:.15g} s to {t[-1]:.15g} s"
             raise InputError(f"{name} {time:.9g}: {extent}", hint="give times of the file, s")
     if not first < last:
         raise InputError(f"--from {first:.9g} is not before --to {last:.9g}")

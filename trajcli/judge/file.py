@@ -174,13 +174,15 @@ def _as_delivered(
         return given, None
     if (options.profile or loaded.job.output.consumer) is not None:
         found = _made_for(source, given, options, delivered, (options.profile, loaded))
-        return found or given, None
-    compared = _compared(source, given, options)
-    if compared is None or compared.planned:
+        if found is not None or options.profile is None:
+            return found or given, None
+    elif (compared := _compared(source, given, options)) is None or compared.planned:
         return given, None
     from trajcli.judge.rows.rows_for_consumers import consumers_of
 
     for made in consumers_of(source, given.plan, options.topic, options.field):
+        if options.profile not in (None, made.profile):
+            continue
         found = _made_for(source, given, options, delivered, (made.profile, made.loaded))
         if found is not None and found.plan is not None:
             return found, made.options(given.plan, found.plan)

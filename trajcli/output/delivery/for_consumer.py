@@ -128,9 +128,12 @@ class ForConsumer:
     @property
     def where(self) -> str:
         """The consumer, and where the rows stand, in words."""
-        grid = self.grid
-        rows = "its knots" if isinstance(grid, KnotGrid) else "given times"
-        return f"for {self.profile.name} at {f'{grid.rate:g} Hz' if isinstance(grid, UniformGrid) else rows}"
+        output, rows = self.plan.loaded.job.output, "given times"
+        if isinstance(self.grid, UniformGrid):
+            rows = f"{self.grid.rate:g} Hz"
+        elif isinstance(self.grid, KnotGrid):
+            rows = f"{output.rate:g} Hz and its knots" if output.rows == "both" else "its knots"
+        return f"for {self.profile.name} at {rows}"
 
     @cached_property
     def summary(self) -> str:
