@@ -99,3 +99,20 @@ def test_of_several_shares_of_the_segments_the_fastest_is_taken(
     monkeypatch.setattr(module, "_SHARES", shares[::-1])
     assert lasts() == pytest.approx(best, rel=1e-12)
     assert np.ptp(single) > 1e-3 * best
+
+
+@pytest.mark.parametrize(("ends", "shift"), [("inside", 0.0), ("centred", 0.15)])
+def test_a_motion_through_its_ends_begins_and_ends_as_far_beside_them_as_it_goes_in_half_a_blend(
+    ends: str, shift: float
+) -> None:
+    q, v = np.array([[0.0, 1.0], [2.0, 0.0], [1.0, 3.0]]), np.array([[0.5, 0.0], [-1.0, 0.25]])
+    start, through = timed([0, 1, 3], q, velocity=v[1].tolist())
+    move = {"planner": "blends", "through": through, "blend_durations": 0.3, "end_blends": ends}
+    made = plan(start | {"velocity": v[0].tolist()}, move)
+    curve, planned = curve_of(made), made.moves[0].planned
+    assert curve.duration == pytest.approx(3 + 2 * shift)
+    first, last = q[0] - shift * v[0], q[-1] + shift * v[1]
+    np.testing.assert_allclose([curve.evaluate(0.0), curve.evaluate(curve.end)], [first, last], atol=1e-12)
+    np.testing.assert_allclose([curve.evaluate(0.0, 1), curve.evaluate(curve.end, 1)], v, atol=1e-12)
+    np.testing.assert_allclose([planned.begins.position, planned.end.position], [first, last], atol=1e-12)
+    np.testing.assert_allclose([planned.begins.velocity, planned.end.velocity], v)
