@@ -44,7 +44,10 @@ def test_the_use_is_the_largest_of_all_times(seed: int) -> None:
         if sampled > 1e6:
             assert use.used > 1e6
             continue
-        assert sampled * (1 - 1e-12) <= use.used <= sampled * (1 + 1e-3)
+        rounding = (
+            1e-11 + 1e-12 * sampled
+        )  # distances count for as much larger as it may have made them smaller
+        assert sampled * (1 - rounding) <= use.used <= sampled * (1 + 1e-3)
         assert use.used == pytest.approx(use.velocity / use.limit, rel=1e-6)
         assert curve.evaluate(use.time, 1)[use.component] == pytest.approx(use.velocity, rel=1e-9)
 
