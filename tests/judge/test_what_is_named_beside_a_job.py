@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_files_beside_jobs import TWO_MOVES as SLOW_MOVES
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.read import load_job
@@ -25,16 +26,7 @@ start: {joints: [0, 0.5]}
 moves: [{planner: quintic, to: {joints: [1, 0.5]}, duration: DURATION}]
 output: {rate: 100FOR}
 """
-TWO_MOVES = """\
-version: 1
-robot: {joints: 2}
-limits: {velocity: 9, acceleration: 90, jerk: null}
-start: {joints: [0, 0]}
-moves:
-  - {planner: quintic, to: {joints: [1, 0]}, duration: 0.3}
-  - {planner: quintic, to: {joints: [1, 1]}, duration: 1, limits: {velocity: 2}}
-output: {rate: 100}
-"""
+TWO_MOVES = SLOW_MOVES.replace("[1, 0]}, duration: 1}", "[1, 0]}, duration: 0.3}")
 PLANAR = """\
 version: 1
 robot: planar2r
