@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -240,7 +241,44 @@ def test_the_elbow_of_a_redundant_arm_is_pinned() -> None:
 def refused(*moves: dict[str, Any], **fields: Any) -> str:
     with pytest.raises(TrajcliError) as caught:
         planned(*moves, **fields)
-    return str(caught.value)
+    return "".join(f"{problem.message}\n{problem.hint or ''}\n" for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "rail"),
+    [((2.5, 0.2, 0.9), 4.5, 0.5), ((2.5, 0.2, 0.9), 4.5, 0.0), ((1.8, 0.0, 1.6), -1.5, 1.1)],
+)
+def test_a_pinned_rail_that_leaves_the_arm_behind_is_named(begin, end: float, rail: float) -> None:
+    """The wrist is as far from the shoulder as both links are long: in a plane through the first axis."""
+    line = {"planner": "line", "law": LAW}
+    text = refused(
+        go(xyz=begin, joints={"rail": 1.0}),
+        {**line, "to": {"xyz": [end, *begin[1:]], "joints": {"rail": rail}}},
+    )
+    found = re.search(r"with rail as it is pinned, .* beyond s = (\S+) m: it stays up to (\S+) m away", text)
+    assert found is not None, text
+    (place, away), (first, shoulder, elbow, wrist, _, flange) = found.groups(), load_robot("irb4600").joints
+    share = np.array([float(place) / abs(end - begin[0]), 1.0])
+    beside = np.hypot(begin[0] - 1.0 + share * (end - begin[0] - rail + 1.0), begin[1])
+    distances = np.hypot(beside - first.a, begin[2] + flange.d - first.d)
+    reached = shoulder.a + np.hypot(elbow.a, wrist.d)
+    np.testing.assert_allclose(distances, reached + np.array([0.0, float(away)]), atol=1e-5)
+    assert ", or give rail another value at the target" in text
+
+
+def test_another_value_of_a_pinned_rail_lets_the_arm_reach_the_path() -> None:
+    line = {"planner": "line", "to": {"xyz": [4.5, 0.2, 0.9], "joints": {"rail": 3.4}}, "law": LAW}
+    planned(go(joints={"rail": 1.0}), line)
+
+
+def test_a_singularity_on_the_way_of_a_pinned_rail_is_named() -> None:
+    """The wrist passes the axis of the first joint after 0.8 m."""
+    line = {"planner": "line", "to": {"xyz": [0.5, 0.0, 1.6], "joints": {"rail": 1.0}}, "law": LAW}
+    text = refused(go(xyz=[1.8, 0.0, 1.6], joints={"rail": 1.0}), line)
+    found = re.search(r"runs into a singularity at s = ([0-9.]+) m.* singular value ([0-9.e-]+)\)", text)
+    assert found is not None, text
+    assert float(found[1]) == pytest.approx(0.8, abs=1e-4)
+    assert float(found[2]) < 1e-5
 
 
 def test_what_cannot_be_pinned_is_refused() -> None:

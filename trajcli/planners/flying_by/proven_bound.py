@@ -39,7 +39,7 @@ _GRIDS = (
     (0.08, 8, 6),
     (0.0, 16, 10),
 )  # width of a box from which on: intervals of line, of zone
-_PROGRAMMES = 240  # at most
+_PROGRAMMES = 280  # at most
 _ENOUGH = 0.005  # of the duration that is known: nearer to it a bound is good enough
 _THIN = 0.02  # of the whole: a share below which it counts as large
 _SWITCHES = (0.25, 0.5, 0.75)  # of an interval, before which extremes have another sign than behind
@@ -204,6 +204,7 @@ class ShareProgramme:
             np.zeros(len(self.variables)),
             np.concatenate([states, np.stack([box.low, box.high], axis=1)]),
             method="highs-ds",
+            options={"presolve": False},  # takes longer than it saves
         )
         if solved.status != 0:
             return 0.0  # nothing is known

@@ -21,15 +21,15 @@ from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance, probes, tolerance_ratio
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.following.tracking import StuckError, track_branch
-from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.target import residual_jacobian
-from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.tool import limits_tool
 from trajcli.planners.planner import Event, Phase
 
 if TYPE_CHECKING:
     from trajcli.curves.time_optimal.phase_plane import PhasePlane
+    from trajcli.kinematics.following.tool_path import ToolReference
+    from trajcli.kinematics.inverse.target import IkTarget
 
 _BISECTIONS = 20
 _SAMPLES = 17  # of the rest of the path, at which it is asked whether the arm reaches it
@@ -111,19 +111,17 @@ class FollowingDiagnosis:
 
     def _unreachable(self, at: float) -> PlanningError | None:
         """Return the error that the path leaves the arm's workspace, if it does so beyond `at`."""
-        from trajcli.kinematics.inverse.solve import solve
-
         samples = np.linspace(at, self.end, _SAMPLES)
         samples[0] = min(at + _NEXT * self.end, self.end)
-        answers = solve(self.robot, self.reference(samples, "left").target(), None)
-        valid = answers.valid.any(axis=-1)
+        reference = self.reference(samples, "left")
+        answers, shortfall = self._answers(reference, reference.target())
+        valid = np.array([len(joints) > 0 for joints in answers])
         if valid.all():
             return None
         first, last = int(np.argmin(valid)), at
         if first:
-            known = answers.joints[first - 1][answers.valid[first - 1]]
-            last = self._last_reached(float(samples[first - 1]), float(samples[first]), known)
-        missed = answers.shortfall.max(axis=0)
+            last = self._last_reached(float(samples[first - 1]), float(samples[first]), answers[first - 1])
+        missed = shortfall.max(axis=0)
         kind = int(missed[1] * characteristic_length(self.robot) > missed[0])
         amounts: Amounts = {
             "robot": self.robot.name,
@@ -132,25 +130,49 @@ class FollowingDiagnosis:
         }
         message = "{robot} does not reach the path beyond s = {place}: it stays up to {missed} away"
         hint = "move the path nearer to the arm"
-        far = answers.shortfall[~valid, 0].argsort()[::-1]
+        if reference.pinned:
+            names = ", ".join(self.robot.joint_names[joint] for joint in reference.pinned)
+            message = f"with {names} as it is pinned, {message}"
+            hint += f", or give {names} another value at the target"
+        far = shortfall[~valid, 0].argsort()[::-1]
         if self._reached_with_free_roll(samples[~valid][far]):
             axis = self.reference(samples[:1], "left").tool_axis
             hint += f", or give only the `direction` of the tool's {axis} axis at the target"
         return UnreachablePathError(Problem(message, hint, amounts=amounts))
 
-    def _reached_with_free_roll(self, samples: Array) -> bool:
-        """Return whether the arm reaches the path, at samples (k,) from the worst on, with a free roll."""
+    def _answers(self, reference: ToolReference, target: IkTarget) -> tuple[list[Array], Array]:
+        """Return the joint values (k, n) that meet each of N targets, and by how much it is missed, (N, 2).
+
+        They are those of the joints that are not pinned.
+        """
         from trajcli.kinematics.inverse.solve import solve
 
-        reference = self.reference(samples, "left")
-        if reference.orientation != "all":
+        count = len(target.poses)
+        parts = [slice(None)] if reference.pins is None else [slice(k, k + 1) for k in range(count)]
+        found = [solve(self._arm(reference, part.start), target.rows(part), None) for part in parts]
+        joints = [q[valid] for each in found for q, valid in zip(each.joints, each.valid, strict=True)]
+        return joints, np.concatenate([each.shortfall for each in found])
+
+    def _arm(self, reference: ToolReference, row: int | None) -> Robot:
+        """Return the arm of the joints that are not pinned in a row of a reference."""
+        if reference.pins is None or row is None:
+            return self.robot
+        from trajcli.kinematics.inverse.pinned_joints import without_pinned
+
+        return without_pinned(
+            self.robot, dict(zip(reference.pinned, reference.pins[0, row].tolist(), strict=True))
+        )
+
+    def _reached_with_free_roll(self, samples: Array) -> bool:
+        """Return whether the arm reaches the path, at samples (k,) from the worst on, with a free roll."""
+        if self.reference(samples[:1], "left").orientation != "all":
             return False
-        target = replace(reference, orientation="direction").target()
-        parts = (
-            target.rows(slice(0, 1)),
-            target.rows(slice(1, None)),
-        )  # failures cost most
-        return all(solve(self.robot, part, None).valid.any(axis=-1).all() for part in parts)
+        for part in filter(len, (samples[:1], samples[1:])):  # failures cost most
+            reference = replace(self.reference(part, "left"), orientation="direction")
+            answers, _ = self._answers(reference, reference.target())
+            if not all(len(joints) for joints in answers):
+                return False
+        return True
 
     def _last_reached(self, low: float, high: float, known: Array) -> float:
         """Return how far beyond `low`, where joint values (k, n) are known, some meet the target."""
@@ -158,8 +180,8 @@ class FollowingDiagnosis:
 
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
-            target = self.reference(np.full(len(known), middle), "left").target()
-            joints, met = descend(self.robot, target, known, None)
+            reference = self.reference(np.full(len(known), middle), "left")
+            joints, met = descend(self._arm(reference, 0), reference.target(), known, None)
             if met.any():
                 low, known = middle, joints[met]
             else:
@@ -168,11 +190,9 @@ class FollowingDiagnosis:
 
     def _singular(self, at: float, joints: Array, rates: Array, most: int | None = None) -> PlanningError:
         """Return the error that names the singularity at `at`, and the joint that goes fastest there."""
-        reference = self.reference(np.array([at]), "right")
-        poses, columns = forward(self.robot, joints[None]), jacobian(self.robot, joints[None])
-        rows = residual_jacobian(reference.target(), poses, columns)[0]
-        rows[: sum(reference.position)] /= characteristic_length(self.robot)
-        values = np.linalg.svd(rows, compute_uv=False)
+        bare = Follower(self.robot, self.reference, joints, np.empty((0, joints.size)))
+        rows = bare.rows(self.reference(np.array([at]), "right"), *linearisation(self.robot, joints[None]))
+        values = np.linalg.svd(rows[0], compute_uv=False)
         ratio = float(values[len(joints) - self.free - 1] / values[0])
         if ratio > _REGULAR and (self.free or most is not None):
             return self._regular(at, most)
