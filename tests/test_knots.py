@@ -72,7 +72,7 @@ def test_quintics_of_continuity_two_are_reproduced(name: str) -> None:
     assert (largest_differences(trajectory, knots) <= [1e-9, 1e-8, 1e-6]).all()
     assert knots.deviation.position <= 1e-9
     assert knots.deviation.velocity <= 1e-8
-    assert knots.deviation.acceleration <= 1e-6
+    assert (knots.velocity[-1] == 0.0).all()
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -140,7 +140,7 @@ def made_of(curve: PiecewisePolynomial, end: State) -> Trajectory:
 def test_the_deviation_is_that_of_the_worst_interval_and_joint(times, sign: int, joint: int) -> None:
     """Of t^6 a quintic with the states of both ends of a length h misses (h/2)^6 at most, in the middle (Hermite).
 
-    Its error is t^3 (h - t)^3, of which the derivatives reach 96 / sqrt(5)^5 (h/2)^5 and, in the middle, 6 (h/2)^4.
+    Its error is t^3 (h - t)^3, of which the derivative reaches 96 / sqrt(5)^5 (h/2)^5.
     """
     coefficients = np.zeros((7, 1, 3))
     coefficients[0, 0] = 0.1
@@ -151,8 +151,7 @@ def test_the_deviation_is_that_of_the_worst_interval_and_joint(times, sign: int,
     half = np.diff(times).max() / 2
     assert found.position == pytest.approx(2 * half**6, rel=1e-6)
     assert found.velocity == pytest.approx(2 * 96 / 5**2.5 * half**5, rel=1e-6)
-    assert found.acceleration == pytest.approx(2 * 6 * half**4, rel=1e-6)
-    assert found.joints == (joint,) * 3
+    assert found.joints == (joint,) * 2
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -164,10 +163,68 @@ def test_the_deviation_is_found_where_nobody_looks_first(sign: int) -> None:
     end = State(*(curve.evaluate(1.0, order) for order in range(3)))
     found = knots_at(made_of(curve, end), np.array([0.0, 1.0])).deviation
     missed = np.poly1d([1, 0, 0, 0]) * np.poly1d([1, -1]) ** 3 * np.poly1d([1, 3])
-    for order, value in enumerate((found.position, found.velocity, found.acceleration)):
+    for order, value in enumerate((found.position, found.velocity)):
         of_order = missed.deriv(order) if order else missed
         at = [root.real for root in of_order.deriv().roots if abs(root.imag) < 1e-3 and 0 <= root.real <= 1]
         assert value == pytest.approx(max(abs(of_order(t)) for t in [*at, 0.0, 1.0]), rel=1e-6)
+
+
+def touching(seed: int, pieces: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return polynomials u^3 (1 - u)^3 r(u) (13, pieces, 3) for u in [0, 1], and their extents, (2, pieces, 3).
+
+    A quintic with the states at their ends is zero. The extents are those of value and derivative, at numpy's roots.
+    """
+    rng, bump = np.random.default_rng(seed), np.poly1d([-1, 3, -3, 1, 0, 0, 0])
+    coefficients, extents = np.zeros((13, pieces, 3)), np.zeros((2, pieces, 3))
+    for piece, joint in np.ndindex(pieces, 3):
+        curve = bump * np.poly1d(rng.uniform(-1, 1, 7))
+        for order in (0, 1):
+            roots = curve.deriv(order + 1).roots
+            at = np.clip(roots.real[np.abs(roots.imag) < 1e-7], 0, 1)
+            extents[order, piece, joint] = np.abs((curve.deriv(order) if order else curve)(at)).max()
+        coefficients[:, piece, joint] = curve.coeffs
+    return coefficients, extents
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("seed", few(range(30), 2))
+def test_the_deviation_is_found_among_many_that_are_hardly_smaller(seed: int, order: int) -> None:
+    """Of 40 pieces of three joints all miss 1e-8 to 1e-6 less than one of them does."""
+    coefficients, extents = touching(seed, 40)
+    less = 10.0 ** np.random.default_rng(seed).uniform(-8, -6, extents[order].shape)
+    piece, joint = 7 + seed, seed % 3
+    less[piece, joint] = 0.0
+    coefficients *= (-1) ** seed * (1 - less) / extents[order]
+    curve = PiecewisePolynomial(np.arange(41.0), coefficients)
+    found = knots_at(made_of(curve, resting(np.zeros(3))), np.arange(41.0)).deviation
+    assert (found.position, found.velocity)[order] == pytest.approx(1.0, rel=1e-10)
+    assert found.joints[order] == joint
+    other = ((1 - less) * extents[1 - order] / extents[order]).max()
+    assert (found.position, found.velocity)[1 - order] == pytest.approx(other, rel=1e-10)
+
+
+def test_control_points_far_away_hide_no_deviation() -> None:
+    """Those of u^3 (1 - u)^3 T(u) are far beyond it where T is a polynomial of Chebyshev that swings between +-1."""
+    swinging = np.poly1d(np.polynomial.chebyshev.cheb2poly([0] * 6 + [1])[::-1])(np.poly1d([2, -1]))
+    bump = np.poly1d([-1, 3, -3, 1, 0, 0, 0])
+    coefficients = np.zeros((13, 2, 1))
+    coefficients[:, 0, 0], coefficients[6:, 1, 0] = (bump * swinging).coeffs, 1.1 * bump.coeffs
+    curve = PiecewisePolynomial(np.arange(3.0), coefficients)
+    found = knots_at(made_of(curve, resting(np.zeros(1))), np.arange(3.0)).deviation
+    assert found.position == pytest.approx(1.1 / 64, rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_only_the_interval_that_misses_too_much_is_divided(sign: int) -> None:
+    """Of 5000 pieces of 1 ms three are bumps: half of one of 1.05 um misses 2^6 times less, a third of one of 70 3^6."""
+    coefficients = np.zeros((7, 5000, 2))
+    for piece, sizes in ((4500, (70.0, 1.05)), (4600, (0.0, 1.05)), (4700, (0.0, 0.95))):
+        bump = sign * np.array([-1, 3, -3, 1, 0, 0, 0]) * 64e-6 / 1e-3 ** np.arange(6, -1, -1)
+        coefficients[:, piece] = bump[:, None] * sizes
+    curve = PiecewisePolynomial(np.arange(5001) / 1000, coefficients)
+    whole = knots_of(made_of(curve, resting(np.zeros(2)))).nanoseconds
+    wanted = [4_500_333_333, 4_500_666_666, 4_600_500_000]
+    assert np.setdiff1d(whole, np.arange(5001) * 1_000_000).tolist() == wanted
 
 
 def test_around_a_step_of_the_acceleration_quintics_stay_within_both_sides() -> None:

@@ -15,19 +15,19 @@ Source: Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.extrema import piece_extremes
-from trajcli.curves.hermite import hermite_coefficients
+from trajcli.curves.hermite import hermite_coefficients, matrix_times_rows
 from trajcli.curves.piecewise import (
     Array,
     PiecewisePolynomial,
     control_points,
     derivative_coefficients,
     distinct,
-    horner,
     read_only,
     taylor_shift,
 )
@@ -52,8 +52,8 @@ _SHORTEST_STEP = 10_000  # ns: over a shorter interval, rounding would show in t
 _LONGEST_STEP = 200_000  # ns: what a small step needs
 _FEWER = 0.1  # of the deviation, between cubics: tools on paths promise a millionth themselves
 _MOST_PARTS = 64  # of an interval that is divided at once
-_SEEN = (0.15, 0.3, 0.5, 0.7, 0.85)  # of an interval: where what is missed is looked at
-_BLOCK = 16_384  # intervals looked at together: what is computed of them takes some MB
+_SAME = 1e-12  # of what is missed: by so much it may be larger than stated
+_BLOCK = 4096  # intervals looked at together: what is computed of them takes some MB
 _QUINTIC = 3  # derivatives that quintics share with a curve at their ends, of twice the order in their error
 
 
@@ -64,14 +64,12 @@ class Deviation:
     Attributes:
         position: rad or m.
         velocity: Per second.
-        acceleration: Per second squared; where the curve's acceleration steps, about the size of the step.
-        joints: Indices of the joints whose position, velocity and acceleration deviate by that.
+        joints: Indices of the joints whose position and velocity deviate by that.
     """
 
     position: float
     velocity: float
-    acceleration: float
-    joints: tuple[int, int, int]
+    joints: tuple[int, int]
 
 
 @frozen
@@ -133,10 +131,10 @@ def knots_of(trajectory: Trajectory, stated: int = _QUINTIC) -> Knots:
         states = _states(trajectory, whole)
         for time, shift in further.items():
             states[0, np.searchsorted(whole, time)] += shift
-        missed = _missed(curve, whole, states[:stated])
-        inserted = _insertions(whole, missed[0].max(axis=1), stated, allowed)
+        largest, of_intervals = _missed(curve, whole, states[:stated], allowed)
+        inserted = _insertions(whole, of_intervals, stated, allowed)
         if not inserted.size:
-            return Knots(whole, states[0], states[1], states[2], _deviation(missed))
+            return Knots(whole, states[0], states[1], states[2], _deviation(largest))
         whole = np.sort(np.concatenate([whole, inserted]))
 
 
@@ -159,7 +157,9 @@ def knots_at(trajectory: Trajectory, times: Array) -> Knots:
     last = whole[-1] / _PER_SECOND
     whole[-1] += last < trajectory.duration - max(_ROUNDING, 4 * float(np.spacing(trajectory.duration)))
     states = _states(trajectory, whole)
-    return Knots(whole, states[0], states[1], states[2], _deviation(_missed(trajectory.curve, whole, states)))
+    return Knots(
+        whole, states[0], states[1], states[2], _deviation(_missed(trajectory.curve, whole, states)[0])
+    )
 
 
 def knot_grid(
@@ -194,11 +194,9 @@ def knot_grid(
 
 
 def _deviation(missed: Array) -> Deviation:
-    """Return the largest of what is missed in each interval, orders 0 to 2, shape (3, k, n)."""
-    by_joint = missed.max(axis=1, initial=0.0)
-    joints = by_joint.argmax(axis=1).tolist()
-    position, velocity, acceleration = by_joint.max(axis=1).tolist()
-    return Deviation(position, velocity, acceleration, (joints[0], joints[1], joints[2]))
+    """Return the largest of what is missed of each joint's position and velocity, shape (2, n)."""
+    (position, velocity), joints = missed.max(axis=1).tolist(), missed.argmax(axis=1).tolist()
+    return Deviation(position, velocity, (joints[0], joints[1]))
 
 
 def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, dict[int, Array], float]:
@@ -209,14 +207,15 @@ def _first_knots(curve: PiecewisePolynomial, stated: int) -> tuple[Nanoseconds, 
     """
     breaks = curve.breaks - curve.start
     whole = np.rint(breaks * _PER_SECOND).astype(np.int64)
-    steps = _steps(curve, np.arange(breaks.size))
+    rates = [curve.piece_ends(order) for order in (1, 2)]
+    steps = _steps(curve, np.arange(breaks.size), rates)
     up = np.arange(breaks.size) == curve.pieces
     up |= np.asarray(steps.any(axis=1))  # behind a step, and nowhere before the end
     spacing = np.maximum(_ROUNDING, 4 * np.spacing(breaks))
     whole += up & (whole / _PER_SECOND < breaks - spacing)
     kept = _apart(whole)
     allowed = _allowed(curve, stated, stepping=stated == _QUINTIC and bool(steps.any()))
-    times, steps = whole[kept], _steps(curve, kept)
+    times, steps = whole[kept], _steps(curve, kept, rates)
     sizes = np.abs(steps).max(axis=1, initial=0.0)
     if stated < _QUINTIC or not sizes.any():
         return times, {}, allowed
@@ -248,16 +247,18 @@ def _allowed(curve: PiecewisePolynomial, stated: int, *, stepping: bool) -> floa
     return min(largest, max(_OFF_BREAKS, 4.0 * rounding, float(ramp)))
 
 
-def _steps(curve: PiecewisePolynomial, kept: NDArray[np.intp]) -> Array:
-    """Return the step of the acceleration at the breaks `kept`, shape (k, n); 0 for none, and at the ends."""
+def _steps(curve: PiecewisePolynomial, kept: NDArray[np.intp], rates: Sequence[tuple[Array, Array]]) -> Array:
+    """Return the step of the acceleration at the breaks `kept`, shape (k, n); 0 for none, and at the ends.
+
+    The `rates` are velocity and acceleration at both ends of the pieces.
+    """
     steps: Array = np.zeros((kept.size, curve.dimension))
     if kept.size <= 2:
         return steps
     before, after = kept[1:-1] - 1, kept[2:] - 1
     lasting = curve.lengths >= _ONE / _PER_SECOND
     real = []
-    for order, little in ((1, _RAMP), (2, _CONTINUOUS)):
-        first, last = curve.piece_ends(order)
+    for (first, last), little in zip(rates, (_RAMP, _CONTINUOUS), strict=True):
         scale = np.maximum(np.abs(first), np.abs(last))[lasting].max(axis=0, initial=0.0)
         steps[1:-1] = first[after] - last[before]
         real.append(np.abs(steps) > little * scale)
@@ -292,61 +293,82 @@ def _states(trajectory: Trajectory, whole: Nanoseconds) -> Array:
     return states
 
 
-def _missed(curve: PiecewisePolynomial, whole: Nanoseconds, states: Array) -> Array:
-    """Return what polynomials miss in each of the k intervals between knots, orders 0 to 2, (3, k, n)."""
-    missed = np.zeros((3, whole.size - 1, curve.dimension))
+def _missed(
+    curve: PiecewisePolynomial, whole: Nanoseconds, states: Array, allowed: float = np.inf
+) -> tuple[Array, Array]:
+    """Return what polynomials miss of positions and velocities, (2, n), and of positions in intervals, (k,).
+
+    Where an interval misses no more than is `allowed` the latter is zero.
+    """
+    largest, of_intervals = np.zeros((2, curve.dimension)), np.zeros(whole.size - 1)
     times = np.append(whole[:-1] / _PER_SECOND + curve.start, curve.end)
     for first in range(0, whole.size - 1, _BLOCK):
         knots = slice(first, first + _BLOCK + 1)
-        _note_missed(curve, whole[knots], times[knots], states[:, knots], missed[:, first : first + _BLOCK])
-    return missed
+        points, interval = _difference(curve, whole[knots], times[knots], states[:, knots])
+        bounds = np.maximum(points.max(axis=0), -points.min(axis=0))
+        joint, part = np.nonzero(bounds[0] > allowed)
+        found = _largest(points[:, 0, joint, part], np.arange(part.size), np.zeros(part.size))
+        np.maximum.at(of_intervals[first:], interval[part], found)
+        for likely in (0.5, 0.0):  # what may miss most first: the others seldom can miss more
+            at_least = np.maximum(largest[..., None], likely * bounds.max(axis=2, keepdims=True))
+            order, joint, part = np.nonzero(bounds > at_least)
+            _largest(
+                points[:, order, joint, part],
+                np.ravel_multi_index((order, joint), largest.shape),
+                largest.reshape(-1),
+            )
+            bounds[order, joint, part] = 0.0
+    return largest, of_intervals
 
 
-def _note_missed(
-    curve: PiecewisePolynomial, whole: Nanoseconds, times: Array, states: Array, missed: Array
-) -> None:
-    """Write what polynomials miss in intervals that follow each other into `missed` (3, k, n)."""
+def _difference(
+    curve: PiecewisePolynomial, whole: Nanoseconds, times: Array, states: Array
+) -> tuple[Array, NDArray[np.intp]]:
+    """Return control points of what polynomials miss in w parts of intervals that follow each other.
+
+    Returns:
+        Of positions and velocities, (degree + 1, 2, n, w), and to which interval each part belongs, (w,).
+    """
     between = slice(*np.searchsorted(curve.breaks, times[[0, -1]]).tolist())
     united = distinct(np.concatenate([times, curve.breaks[between]]))
     starts, lengths = united[:-1], np.diff(united)
     within = starts + lengths / 2
     interval = np.clip(np.searchsorted(times, within, "right") - 1, 0, times.size - 2)
     piece = np.clip(np.searchsorted(curve.breaks, within, "right") - 1, 0, curve.pieces - 1)
-    joined = hermite_coefficients(states[:, :-1], states[:, 1:], (np.diff(whole) / _PER_SECOND)[:, None])
-    difference = taylor_shift(curve.coefficients[:, piece], (starts - curve.breaks[piece])[:, None])
-    short = max(0, joined.shape[0] - difference.shape[0])
-    difference = np.concatenate([np.zeros((short, *difference.shape[1:])), difference])
-    difference[-joined.shape[0] :] -= taylor_shift(joined[:, interval], (starts - times[interval])[:, None])
-    part, joint = np.nonzero(_may_count(difference, lengths, interval, missed))
-    chosen, long = difference[:, part, joint, None], lengths[part]
-    for order, (low, high) in enumerate(piece_extremes(chosen, long, (0, 1, 2))):
-        np.maximum.at(missed[order], (interval[part], joint), np.maximum(-low, high)[:, 0])
+    states = np.ascontiguousarray(states.transpose(0, 2, 1))  # long rows are fast
+    joined = hermite_coefficients(states[..., :-1], states[..., 1:], np.diff(whole) / _PER_SECOND)
+    own = np.ascontiguousarray(curve.coefficients[:, piece].transpose(0, 2, 1))
+    own, joined = taylor_shift(own, starts - curve.breaks[piece]), joined[:, :, interval]
+    difference = np.zeros((max(len(own), len(joined)), 2, *own.shape[1:]))
+    difference[-len(own) :, 0] = own
+    difference[-len(joined) :, 0] -= taylor_shift(joined, starts - times[interval])
+    difference[1:, 1] = derivative_coefficients(difference[:, 0], 1)
+    return control_points(difference, lengths), interval
 
 
-def _may_count(
-    difference: Array, lengths: Array, interval: NDArray[np.intp], missed: Array
-) -> NDArray[np.bool_]:
-    """Return of which polynomials (w, n) the extremes may count; of the others what is seen is enough.
+def _largest(points: Array, owner: NDArray[np.intp], largest: Array) -> Array:
+    """Raise `largest` (k,) at `owner` (m,) to magnitudes of polynomials, by control points (degree + 1, m).
 
-    An extreme counts where it is the largest of its joint, or where knots are to be inserted.
-
-    Args:
-        difference: What is missed, shape (degree + 1, w, n).
-        lengths: Shape (w,).
-        interval: To which of the intervals (k,) each belongs, shape (w,), rising.
-        missed: What is missed in these, orders 0 to 2, shape (3, k, n): what is seen is written into it.
+    What may be larger than any value that is reached is quartered, until it may be by rounding alone.
     """
-    counts = np.zeros(difference.shape[1:], dtype=bool)
-    first = np.flatnonzero(np.diff(interval, prepend=-1))
-    for order, own in enumerate(missed):
-        derivative = derivative_coefficients(difference, order)
-        bound = np.abs(control_points(derivative, lengths[:, None])).max(axis=0)
-        seen = [np.abs(horner(derivative, part * lengths[:, None])) for part in _SEEN]
-        own[interval[first]] = np.maximum.reduceat(np.max(seen, axis=0), first)
-        counts |= bound > own.max(axis=0)
-        if order == 0:
-            counts |= bound > _FEWER * LARGEST_DEVIATION
-    return counts
+    size = len(points)
+    while owner.size:
+        np.maximum.at(largest, owner, np.abs(points[[0, -1]]).max(axis=0))
+        may_count = np.abs(points).max(axis=0) > largest[owner] * (1 + _SAME)
+        parts = matrix_times_rows(_quarters(size), points[:, may_count]).reshape(4, size, -1)
+        points, owner = parts.transpose(1, 0, 2).reshape(size, -1), np.tile(owner[may_count], 4)
+    return largest
+
+
+@cache
+def _quarters(size: int) -> Array:
+    """Return what makes the control points of the quarters of a polynomial, (4 size, size), of those of all.
+
+    Source: Farouki (2012), section 4, on de Casteljau's algorithm.
+    """
+    left = np.array([[comb(k, i) / 2.0**k for i in range(size)] for k in range(size)])
+    halves = np.concatenate([left, left[::-1, ::-1]])
+    return np.concatenate([halves @ left, halves @ left[::-1, ::-1]])
 
 
 def _insertions(whole: Nanoseconds, missed: Array, stated: int, allowed: float) -> Nanoseconds:

@@ -39,11 +39,11 @@ def hermite_coefficients(start: Array, end: Array, duration: Array) -> Array:
     a, e = low * powers[:k], end / factorials * powers[:k]
     displacement = e - a
     from_start, from_end = _matrices(k)
-    high = _product(from_end, displacement) + _product(from_start, a[1:])
+    high = matrix_times_rows(from_end, displacement) + matrix_times_rows(from_start, a[1:])
     return np.concatenate([high[::-1] / powers[k:][::-1], low[::-1]])
 
 
-def _product(matrix: Array, rows: Array) -> Array:
+def matrix_times_rows(matrix: Array, rows: Array) -> Array:
     """Return the matrix times rows (k, ...), summed in one order: BLAS would sum as memory happens to lie."""
     result = np.zeros((matrix.shape[0], *rows.shape[1:]))
     for column, row in zip(matrix.T, rows, strict=True):

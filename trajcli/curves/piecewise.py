@@ -208,10 +208,10 @@ def horner(coefficients: Array, x: Array) -> Array:
 def taylor_shift(coefficients: Array, x: Array) -> Array:
     """Return the coefficients (degree + 1, ...) of p(t + x) for p given by `coefficients`."""
     shifted = np.array(coefficients, dtype=np.float64)
-    degree = shifted.shape[0] - 1
-    for last in range(degree, 0, -1):
-        for power in range(1, last + 1):
-            shifted[power] += x * shifted[power - 1]
+    rows = list(shifted[:, None])
+    for last in range(len(rows), 1, -1):
+        for power in range(1, last):
+            rows[power] += x * rows[power - 1]
     return shifted
 
 
@@ -233,8 +233,10 @@ def control_points(coefficients: Array, lengths: Array) -> Array:
     for k in range(1, degree + 1):
         power = power * lengths
         points[k] *= power / comb(degree, k)
+    rows = list(points[:, None])  # views, of numbers too
     for k in range(1, degree + 1):
-        points[k:] = points[k:] + points[k - 1 : -1]
+        for row in range(degree, k - 1, -1):
+            rows[row] += rows[row - 1]
     return points
 
 

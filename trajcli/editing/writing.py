@@ -199,7 +199,7 @@ def _knots(motion: EditedMotion) -> Knots:
     nanoseconds = np.rint((rows.t - rows.t[0]) * _PER_SECOND).astype(np.int64)
     if (np.diff(nanoseconds) <= 0).any():
         raise InputError(f"{rows.source} has rows in one nanosecond, which times of ROS cannot tell apart")
-    return Knots(nanoseconds, states["q"], states["qd"], states["qdd"], Deviation(0.0, 0.0, 0.0, (0, 0, 0)))
+    return Knots(nanoseconds, states["q"], states["qd"], states["qdd"], Deviation(0.0, 0.0, (0, 0)))
 
 
 def _recording(motion: EditedMotion, knots: Knots) -> Recording:
