@@ -40,7 +40,7 @@ INTERVALS, FINE = 3, 16  # of a part; fine steps of each interval, which meet th
 @pytest.fixture
 def few_programmes(monkeypatch: pytest.MonkeyPatch) -> None:
     if QUICK:
-        monkeypatch.setattr(proven_bound, "_PROGRAMMES", 40)
+        monkeypatch.setattr(proven_bound, "_PROGRAMMES", ((0.005, 40),))
 
 
 def planned(*targets: list[float], robot: str = "planar2r", zone: object = 0.02, **fields: object) -> Plan:
@@ -270,6 +270,14 @@ def test_of_random_arms_it_is_never_above_the_motion_and_near(seed: int, few_pro
     assert (0.8 if QUICK else 0.96) <= share <= 1.0
 
 
+@pytest.mark.full
+def test_a_bound_that_is_far_is_searched_for_longer() -> None:
+    """Of 58 random programs this is the one whose bound is still 4.3 % away after 280 programmes."""
+    share = proven_share(1001)
+    assert share is not None
+    assert share >= 0.97
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("block", range(10))
 def test_of_two_hundred_random_programs_it_is_near(block: int, tally: Tally) -> None:
@@ -277,6 +285,5 @@ def test_of_two_hundred_random_programs_it_is_near(block: int, tally: Tally) -> 
     gaps = [1 - share for share in found if share is not None]
     assert min(gaps) >= 0
     assert np.median(gaps) <= 0.01
-    beyond = int(np.sum(np.array(gaps) > 0.03))
-    assert beyond <= 1
-    tally({"programs": len(gaps), "further than 3 %": beyond, "widest gap": max(gaps)})
+    assert max(gaps) <= 0.03
+    tally({"programs": len(gaps), "widest gap": max(gaps)})

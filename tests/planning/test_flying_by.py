@@ -443,7 +443,9 @@ def test_a_job_that_lacks_a_limit_says_which():
 
 
 def test_rows_and_reports_say_where_zones_are(monkeypatch):
-    monkeypatch.setattr("trajcli.planners.flying_by.proven_bound._PROGRAMMES", 8)  # a bound, if none so close
+    monkeypatch.setattr(
+        "trajcli.planners.flying_by.proven_bound._PROGRAMMES", ((0.005, 8),)
+    )  # a bound, if none so close
     plan = pick(20)
     report = report_of(plan)
     assert report.flyby is not None

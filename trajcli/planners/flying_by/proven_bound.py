@@ -39,8 +39,7 @@ _GRIDS = (
     (0.08, 8, 6),
     (0.0, 16, 10),
 )  # width of a box from which on: intervals of line, of zone
-_PROGRAMMES = 280  # at most
-_ENOUGH = 0.005  # of the duration that is known: nearer to it a bound is good enough
+_PROGRAMMES = ((0.005, 280), (0.03, 700))  # at most, while a bound is further from the duration that is known
 _THIN = 0.02  # of the whole: a share below which it counts as large
 _SWITCHES = (0.25, 0.5, 0.75)  # of an interval, before which extremes have another sign than behind
 _MOST = 10.0  # times its distance, that a motion covers in the programme
@@ -101,7 +100,7 @@ def least_duration(chain: FlyByChain, duration: float) -> float:
     programmes = [ShareProgramme(chain, line, zone) for _, line, zone in _GRIDS]
     queue = [(0.0, 0, ShareBox((0.0, 0.0), (1.0, 1.0)))]
     count = 0
-    while count < _PROGRAMMES and queue[0][0] < duration * (1 - _ENOUGH):
+    while any(count < n and queue[0][0] < duration * (1 - gap) for gap, n in _PROGRAMMES):
         least, _, box = heapq.heappop(queue)
         for half in box.halves():
             count += 1
