@@ -109,11 +109,9 @@ def _quintic(points: PointTable, times: Array) -> PiecewisePolynomial:
     """Return the quintics; what a point does not give is computed."""
     ends = points.rates[:, [0, -1]]
     velocities = parabola_velocities(times, points.positions, *ends[0])
-    given = points.given.copy()
-    given[:, [0, -1]] = True
-    velocities = np.where(given[0][:, None], points.rates[0], velocities)
+    velocities = np.where(points.given[0][:, None], points.rates[0], velocities)
     accelerations = computed_accelerations(times, velocities, *ends[1])
-    accelerations = np.where(given[1][:, None], points.rates[1], accelerations)
+    accelerations = np.where(points.given[1][:, None], points.rates[1], accelerations)
     return quintic_through(times, points.positions, velocities, accelerations)
 
 
