@@ -7,13 +7,15 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from through_jobs import curve_of, plan, refusal
 
-from trajcli.errors import MissingLimitError
+from trajcli.errors import MissingLimitError, PlanningError
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
 from trajcli.planners.planner import Planned
 from trajcli.planners.waypoints import time_optimal
 from trajcli.planners.waypoints.time_optimal import TimeOptimal
+from trajcli.planning.planned_move import handed_over
 from trajcli.trajectory import State, resting
 
 LIMITS = {"velocity": 2.0, "acceleration": 8.0}
@@ -253,3 +255,61 @@ def test_points_in_one_place_are_a_rest(duration: float | None) -> None:
         assert "no path leads out" in str(
             refusal(moving, {"planner": "time_optimal", "to": moving, **fields}, limits=LIMITS)
         )
+
+
+def test_a_motion_into_a_motion_may_last_as_long_as_it_does() -> None:
+    moving: dict[str, Any] = {"start": {"velocity": [0.3, -0.1]}}
+    duration = planned(**moving).curve.duration
+    assert planned(**moving, duration=duration).curve.duration == duration
+
+
+def test_what_ignores_jerk_starts_with_no_acceleration() -> None:
+    """Its acceleration steps anyway: one that is stated is refused, one of a move before is left there."""
+    start = {"velocity": [0.3, -0.1], "acceleration": [0.6, -0.2]}
+    assert "time_optimal cannot start with an acceleration" in refused(start=start, jerk="ignore")
+    state = State(np.array(POINTS[-1]), np.zeros(2), np.array([0.5, 0.0]))
+    still = mover([POINTS[-1], POINTS[-1]])
+    assert still.plan(state, arm()).curve.duration == 0.0
+    with pytest.raises(PlanningError, match="starts with j1"):
+        still.plan(state, arm(jerk=80.0))
+
+
+def test_its_course_has_no_jumps_of_curvature_to_fly_by() -> None:
+    course = mover(path="polyline", corner=0.05).course(np.array(POINTS[0]), arm(), planned())
+    begins, ends = course.curve.piece_ends(2)  # type: ignore[attr-defined]
+    np.testing.assert_allclose(begins[1:], ends[:-1], atol=1e-9)
+
+
+def test_where_a_limit_of_jerk_binds_is_told() -> None:
+    names = {phase.name.split()[0] for phase in planned(limits=LIMITS | {"jerk": 80.0}).phases}
+    assert "jerk" in names
+    assert "jerk" not in {phase.name.split()[0] for phase in planned().phases}
+
+
+def test_times_of_a_recording_neither_bind_nor_keep_rests() -> None:
+    positions = [[0.6, -0.2], [0.6, -0.2], [0.9, 0.5]]
+    recorded = {"positions": positions, "times": [1.0, 2.0, 9.0]}
+    found = plan({"joints": POINTS[0]}, {"planner": "time_optimal", "through": recorded}, limits=LIMITS)
+    passed = found.moves[0].planned.via_points
+    assert passed is not None
+    np.testing.assert_allclose(passed.points, POINTS)
+    assert found.trajectory.duration == pytest.approx(planned().curve.duration, rel=1e-9)
+
+
+def test_an_acceleration_is_handed_over_to_what_keeps_jerk_alone() -> None:
+    state = State(np.array(POINTS[0]), np.zeros(2), np.array([0.5, 0.0]))
+    for jerk, kept in (("keep", [0.5, 0.0]), ("ignore", [0.0, 0.0])):
+        np.testing.assert_array_equal(handed_over(state, mover(), mover(jerk=jerk)).acceleration, kept)
+
+
+def test_a_corner_of_nothing_is_stopped_at() -> None:
+    kinds = [event.kind for event in planned(path="polyline", corner=0).events]
+    assert "stops" in kinds
+
+
+def test_left_out_a_path_is_the_spline_of_scipy_by_the_length_of_its_chords() -> None:
+    rows = [*POINTS, [1.6, 0.7], [1.2, 1.5]]
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(rows, axis=0), axis=1))])
+    at = np.linspace(0.0, s[-1], 41)
+    curve = mover(rows).course(np.array(rows[0]), arm(), planned()).curve  # type: ignore[attr-defined]
+    np.testing.assert_allclose(curve.evaluate(at), CubicSpline(s, rows)(at), atol=1e-12)

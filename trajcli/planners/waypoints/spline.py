@@ -175,8 +175,8 @@ class Spline(ThroughPoints):
             PlanningError: When no times keep the limits, or the ends ask for what the rule cannot do.
         """
         points = self.waypoints(start, robot)
-        in_one_place = points.times is None and not np.ptp(points.positions, axis=0).any()
-        if in_one_place and same_state(start, points.target) and (start.at_rest or not self.duration):
+        coincident = points.times is None and not np.ptp(points.positions, axis=0).any()
+        if coincident and same_state(start, points.target) and (start.at_rest or not self.duration):
             return standstill(points.target, self.duration or 0.0, REMEDIES)
         times, events = self._times_of(points, robot)
         curve = self._curve(points, times, robot)
