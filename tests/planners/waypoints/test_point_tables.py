@@ -148,13 +148,17 @@ def test_points_that_repeat_the_one_before_are_left_out_with_all_that_is_theirs(
     places: list[int], kept: list[int]
 ) -> None:
     through = [
-        {"joints": [place, -place + NEAR * (k % 2)], "velocity": [0.01 * k, 0.02 * k]}
+        {"joints": [place, -place + NEAR * (k % 2)]} | ({"velocity": [0.01 * k, 0.02 * k]} if k % 3 else {})
         for k, place in enumerate(places)
     ]
+    stated = np.arange(len(places)) % 3 > 0
     found = table({"rule": "quintic", "through": through[1:]})
     np.testing.assert_array_equal(found.positions, [[0.0, 0.0], *([through[k]["joints"] for k in kept[1:]])])
-    np.testing.assert_array_equal(found.rates[0], [[0.01 * k, 0.02 * k] for k in kept])
-    np.testing.assert_array_equal(found.given, [[True] * len(kept), [True, *[False] * (len(kept) - 1)]])
+    np.testing.assert_array_equal(
+        found.rates[0], [[0.01 * k * stated[k], 0.02 * k * stated[k]] for k in kept]
+    )
+    np.testing.assert_array_equal(found.given[0], [True, *stated[kept[1:]]])
+    np.testing.assert_array_equal(found.given[1], [True, *[False] * (len(kept) - 1)])
     assert found.blends.shape == (len(kept),)
     count = len(places) - len(kept)
     told = [event.message for event in found.events]
@@ -173,3 +177,27 @@ def test_one_joint_that_moves_either_way_makes_another_point(step: list[float]) 
 def test_points_with_times_may_stand_still() -> None:
     through = [{"joints": [1.0, 1.0], "time": float(t)} for t in (1, 2, 3)]
     assert table({"through": through}).count == 4
+
+
+@pytest.mark.parametrize("target", [{}, {"to": {"joints": [3.0, 0.0]}}])
+@pytest.mark.parametrize(
+    ("rows", "dropped"),
+    [
+        ([0.0, 1.0, 2.0], 0),
+        ([1.0, 2.0], 0),
+        ([0.0, 1.0, 1.0, 2.0], 1),
+        ([1.0, 1.0, 1.0, 2.0], 2),
+        ([0.0, 0.0, 2.0], 1),
+    ],
+)
+def test_what_is_left_out_of_a_recording_is_counted(
+    rows: list[float], dropped: int, target: dict[str, Any]
+) -> None:
+    """Its first row is where the arm stands, and is no point of its own."""
+    found = table({"through": {"positions": [[row, 0.0] for row in rows]}, **target})
+    kept = [*dict.fromkeys([0.0, *rows, *([3.0] if target else [])])]
+    assert found.positions[:, 0].tolist() == kept
+    told = [event.message for event in found.events]
+    assert [text[: text.index(" points")] for text in told] == [f"left out {dropped} of {len(rows)}"] * (
+        dropped > 0
+    )

@@ -338,8 +338,8 @@ def _without_repeats(points: PointTable) -> PointTable:
         return points
     keep = np.append(True, ~same)
     if not keep[-1]:  # the target stays, because it may say how fast
-        keep[-1], keep[np.flatnonzero(keep[:-1])[-1]] = True, keep[:-1].sum() == 1
-    keep[0] = True
+        keep[-1], keep[np.flatnonzero(keep[:-1])[-1]] = True, False
+        keep[0] = True
     count = points.count - int(keep.sum())
     text = f"left out {count} waypoint{'s' * (count != 1)} that repeat{'s' * (count == 1)} the one before"
     return replace(
