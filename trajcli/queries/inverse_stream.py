@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.columns import Column, Group, columns_of, parse_column
 from trajcli.curves.piecewise import Array
@@ -27,9 +28,10 @@ from trajcli.streams.table import TableBlocks
 
 _AHEAD = 256  # rows that are looked at together at most, where one branch stays the nearest
 _FEW = 8  # rows that are looked at together at first
-_STAYS = 5  # rows on one branch, after which it is the only one that is followed
-_TOGETHER = 128  # rows whose branches are all compared with those of the rows before
-_HALF = 3.14159  # rad: closer than this no other turn is nearer
+_RUN = 3  # rows on one branch, below which segments are followed
+_LENGTH = 128  # rows of a segment: where the row before was another, seldom more are taken otherwise
+_SEGMENTS = 128  # that are followed at once at most
+_ROUNDS = 6  # of segments, after which fewer are followed at once
 _CLOSE = 0.2  # rad or m: a larger step may have missed a nearer answer, so all are sought
 _AXES, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 
@@ -110,9 +112,9 @@ def _follow(
     arm: ArmInUnits, rows: TableBlocks, inputs: _PoseColumns, near: Array | None, tolerance: float
 ) -> Iterator[Array]:
     last = np.zeros(len(arm.robot.joints)) if near is None else near
-    done = 0
+    done, segments = 0, 1
     for block in rows.blocks:
-        follower = _Follower(arm, _targets(block, inputs, done, rows.file), last, tolerance)
+        follower = _Follower(arm, _targets(block, inputs, done, rows.file), last, tolerance, segments)
         joints = np.empty((len(block), len(last)))
         row = 0
         while row < len(block):
@@ -122,16 +124,22 @@ def _follow(
                 raise _of_row(arm, error, block, inputs, row, done) from None
             joints[row : row + len(answers)] = answers
             row, last = row + len(answers), answers[-1]
-        done += len(block)
+        done, segments = done + len(block), follower.segments
         times = block[:, :0] if inputs.time is None else block[:, [inputs.time]]
         yield np.hstack([times, joints / arm.joint_factors])
 
 
 class _Follower:
-    """Takes the nearest answer row by row; a closed form solves the rows of a block together."""
+    """Takes the nearest answer row by row; a closed form solves the rows of a block together.
 
-    def __init__(self, arm: ArmInUnits, target: IkTarget, last: Array, tolerance: float) -> None:
-        self._arm, self._target, self._tolerance = arm, target, tolerance
+    Attributes:
+        segments: How many are to be followed at once, the next time.
+    """
+
+    def __init__(
+        self, arm: ArmInUnits, target: IkTarget, last: Array, tolerance: float, segments: int
+    ) -> None:
+        self._arm, self._target, self._tolerance, self.segments = arm, target, tolerance, segments
         self._turning = revolute(arm.robot)
         method = method_for(arm.robot)
         self._solutions: Solutions | None = None
@@ -139,11 +147,8 @@ class _Follower:
             self._solutions = solve(arm.robot, target, last, tolerance)
             self._usable = self._solutions.within_limits
             alone = self._solutions.singular.any(axis=-1) | ~self._usable.any(axis=-1)
-            self._alone: Flags = np.asarray(alone)
-            self._ahead, self._stays = _FEW, False
-            self._table, self._table_start = list[list[int]](), 0
-            self._bounds: list[list[float]] = widened(self._solutions.bounds).T.tolist()
-            self._turning_joints = np.flatnonzero(self._turning).tolist()
+            self._alone: Flags = np.append(alone, True)
+            self._ahead = _FEW
             self._prepare_turns(self._solutions)
 
     def _prepare_turns(self, solutions: Solutions) -> None:
@@ -152,9 +157,13 @@ class _Follower:
         with np.errstate(invalid="ignore"):
             down, up = np.ceil((low - solutions.joints) / FULL), np.floor((high - solutions.joints) / FULL)
         usable = self._usable[..., None]
-        turns = np.where(self._turning & usable, [np.minimum(down, 0.0), np.maximum(up, 0.0)], 0.0)
-        self._down, self._up = np.ascontiguousarray(turns)  # numbers of a row beside each other
-        self._joints: Array = np.ascontiguousarray(np.where(usable, solutions.joints, np.inf))
+        down, up = (
+            np.where(self._turning & usable, turns, 0.0)
+            for turns in (np.minimum(down, 0.0), np.maximum(up, 0.0))
+        )
+        joints = np.where(usable, solutions.joints, np.inf)
+        # numbers of a row beside each other, (rows, 3, n, branches)
+        self._choices: Array = np.ascontiguousarray(np.stack([joints, down, up], axis=1).swapaxes(2, 3))
 
     def take(self, row: int, last: Array) -> Array:
         """Return the answers (k, n), k >= 1, of the rows from `row` on, each nearest to the one before.
@@ -171,69 +180,47 @@ class _Follower:
             return self._solved_alone(row, last)[None] if continued is None else continued
         if self._alone[row]:
             return self._solved_alone(row, last)[None]
-        answers, branch = self._nearest(row, last)
-        if row + 1 == len(self._alone):
+        answers = self._nearest(np.array([row]), last[None])
+        if self._alone[row + 1]:
             return answers
-        if self._stays:
-            more = self._on_one_branch(self._solutions, row + 1, answers[0])
-            self._stays = len(more) > 0
-            self._ahead = min(2 * self._ahead, _AHEAD) if len(more) == self._ahead else _FEW
-        else:
-            more = self._across_branches(self._solutions, row + 1, answers[0], branch)
-        return np.concatenate([answers, more]) if len(more) else answers
+        more = self._on_one_branch(self._solutions, row + 1, answers[0])
+        stays = len(more) == self._ahead
+        self._ahead = min(2 * self._ahead, _AHEAD) if stays else _FEW
+        self.segments = 1 if stays else self.segments
+        if len(more) < _RUN:  # the nearest branch is now this one and now that one
+            more = self._in_segments(row + 1, answers[0])
+        return np.concatenate([answers, more])
 
-    def _across_branches(self, solutions: Solutions, row: int, last: Array, branch: int) -> Array:
-        """Return the answers of some rows from `row` on, which start from a branch of the row before.
+    def _in_segments(self, row: int, last: Array) -> Array:
+        """Return the answers of some rows from `row` on, followed in segments, all of them at once.
 
-        The answer that is nearest but for full turns is the nearest, where the turn next to the row before is
-        inside the limits. Plain numbers: arrays of six cost more than the work on them.
+        A segment starts from an answer to the row before it. Where another one is taken there, it is followed
+        again until what it takes is what it took: from there on all would be the same.
         """
-        if not self._table_start <= row < self._table_start + len(self._table):
-            self._table, self._table_start = self._nearest_branches(solutions, row), row
-        answers: list[list[float]] = []
-        values, stayed, start = last.tolist(), 0, self._table_start
-        for k in range(row, start + len(self._table)):
-            if self._alone[k]:
-                break
-            nearest = self._table[k - start][branch]
-            turned = self._turned(self._joints[k, nearest].tolist(), values)
-            if turned is None:
-                rows, nearest = self._nearest(k, np.array(values))
-                turned = rows[0].tolist()
-            stayed = stayed + 1 if nearest == branch else 0
-            values, branch = turned, nearest
-            answers.append(values)
-            if stayed == _STAYS:
-                self._stays = True
-                break
-        return np.array(answers)
-
-    def _turned(self, joints: list[float], last: list[float]) -> list[float] | None:
-        """Return an answer in the turns next to the row before; None where one is outside its limits."""
-        low, high = self._bounds
-        for j in self._turning_joints:
-            gap = last[j] - joints[j]
-            if -_HALF < gap < _HALF:
-                continue
-            turn = round(gap / FULL)
-            joints[j] += FULL * turn
-            if not low[j] <= joints[j] <= high[j]:
-                return None
-        return joints
-
-    def _nearest_branches(self, solutions: Solutions, row: int) -> list[list[int]]:
-        """Return the nearest branch of some rows from `row` on, for each branch of the row before."""
-        joints = solutions.joints[row - 1 : row + _TOGETHER].T  # (n, branches, rows), as they are stored
-        usable = self._usable[row : row + _TOGETHER].T
-        farthest = np.zeros((len(usable), *usable.shape))  # (from, to, rows)
-        for values, turns in zip(joints, self._turning, strict=True):
-            gap = values[:, 1:] - values[:, None, :-1]
-            if turns:
-                gap -= FULL * np.rint(gap * (1.0 / FULL))
-            np.maximum(farthest, np.abs(gap, out=gap), out=farthest)
-        farthest += np.where(usable, 0.0, np.inf)
-        nearest: list[list[int]] = farthest.argmin(axis=1).T.tolist()
-        return nearest
+        alone = self._alone[row : row + self.segments * _LENGTH + 1]
+        free = int(alone.argmax()) if alone.any() else len(alone) - 1
+        length = min(_FEW * self.segments, _LENGTH, free)
+        count = min(self.segments, free // length)
+        rows = row + np.arange(count * length).reshape(count, length)
+        taken = np.full((count, length, len(last)), np.nan)
+        starts, changed = np.tile(last, (count, 1)), np.arange(count)
+        starts[1:] = self._nearest(rows[1:, 0] - 1, starts[1:])
+        for _ in range(_ROUNDS):
+            values = starts[changed]
+            for k in range(length):
+                values = self._nearest(rows[changed, k], values)
+                differs = (values != taken[changed, k]).any(axis=1)
+                taken[changed, k] = values
+                changed, values = changed[differs], values[differs]
+                if not len(changed):
+                    break
+            changed = changed[changed + 1 < count] + 1
+            if not len(changed):
+                self.segments = min(2 * self.segments, _SEGMENTS)
+                return taken.reshape(-1, len(last))
+            starts[changed] = taken[changed - 1, -1]
+        self.segments = max(self.segments // 2, 1)
+        return taken[: changed[0]].reshape(-1, len(last))
 
     def _on_one_branch(self, solutions: Solutions, row: int, last: Array) -> Array:
         """Return the answers while one branch stays the nearest and inside the limits; maybe none."""
@@ -246,7 +233,7 @@ class _Follower:
         turns = np.where(self._turning, np.round(gaps[:, branch] / FULL), 0.0).cumsum(axis=0)
         values = along - FULL * turns
         inside = (beyond(values, solutions.bounds) == 0.0).all(axis=1)
-        ends = np.flatnonzero(~(same & inside & ~self._alone[rows]))
+        ends = np.flatnonzero(~(same & inside & ~self._alone[:-1][rows]))
         return np.asarray(values[: ends[0]] if len(ends) else values)
 
     def _apart(self, gaps: Array, usable: Flags) -> Array:
@@ -254,19 +241,20 @@ class _Follower:
         wrapped = np.where(self._turning, gaps - FULL * np.round(gaps / FULL), gaps)
         return np.where(usable, np.abs(wrapped).max(axis=-1), np.inf)
 
-    def _nearest(self, row: int, last: Array) -> tuple[Array, int]:
-        """Return the nearest answer (1, n) of one row, and its branch; few steps, as rows may be many."""
-        joints = self._joints[row]
-        turns = last - joints
+    def _nearest(self, rows: NDArray[np.intp], last: Array) -> Array:
+        """Return the nearest answers (k, n) of rows (k,), each to its own `last` (k, n); few steps."""
+        choices = self._choices[rows]
+        joints, before = choices[:, 0], last[..., None]
+        turns = before - joints
         turns /= FULL
         np.rint(turns, out=turns)
-        np.maximum(turns, self._down[row], out=turns)
-        np.minimum(turns, self._up[row], out=turns)
-        values = FULL * turns
-        values += joints
-        gaps = values - last
-        branch = int(np.maximum.reduce(np.abs(gaps, out=gaps), axis=1).argmin())
-        return values[branch : branch + 1], branch
+        np.maximum(turns, choices[:, 1], out=turns)
+        np.minimum(turns, choices[:, 2], out=turns)
+        turns *= FULL
+        turns += joints
+        gaps = turns - before
+        nearest = np.maximum.reduce(np.abs(gaps, out=gaps), axis=1).argmin(axis=1)
+        return np.asarray(turns[np.arange(len(rows)), :, nearest])
 
     def _continued(self, row: int, last: Array) -> Array | None:
         """Return the answer (1, n) that Newton's steps find near to the row before; None where they fail."""
