@@ -111,14 +111,16 @@ class _Samples:
     def _local_minima(self) -> tuple[NDArray[np.intp], Array]:
         """Return the samples (branches, starts, B) that no neighbour is nearer than, and their ranks."""
         ranked = self._ranked
-        padded = np.pad(ranked, ((0, 0), (1, 1), (0, 0)), constant_values=np.inf)
-        lowest = (ranked <= padded[:, :-2]) & (ranked <= padded[:, 2:])
+        lowest = np.ones(ranked.shape, dtype=bool)
+        lowest[:, 1:] = ranked[:, 1:] <= ranked[:, :-1]
+        lowest[:, :-1] &= ranked[:, :-1] <= ranked[:, 1:]
         left, chosen = np.where(lowest, ranked, np.inf), []
+        branches, poses = np.arange(len(left))[:, None], np.arange(left.shape[-1])
         for _ in range(_STARTS):
-            best = left.argmin(axis=1)[:, None]
-            chosen.append((best, np.take_along_axis(left, best, axis=1)))
-            np.put_along_axis(left, best, np.inf, axis=1)
-        index, ranks = (np.concatenate(parts, axis=1) for parts in zip(*chosen, strict=True))
+            best = branches, left.argmin(axis=1), poses
+            chosen.append((best[1], left[best]))
+            left[best] = np.inf
+        index, ranks = (np.stack(parts, axis=1) for parts in zip(*chosen, strict=True))
         return index, ranks.reshape(-1, ranks.shape[-1])
 
     def nearest(self) -> tuple[Array, Flags, Array]:
@@ -147,9 +149,9 @@ class _Samples:
 
 def _chosen(values: Array, index: NDArray[np.intp]) -> Array:
     """Return (..., branches * starts, B) of values (..., branches, samples, B), by index."""
-    index = index.reshape(*(1,) * (values.ndim - 3), *index.shape)
-    taken = np.take_along_axis(values, index, axis=-2)
-    return taken.reshape(*taken.shape[:-3], -1, taken.shape[-1])
+    branches, poses = (np.arange(count) for count in (len(index), index.shape[-1]))
+    taken = values[..., branches[:, None, None], index, poses]
+    return np.asarray(taken.reshape(*taken.shape[:-3], -1, taken.shape[-1]))
 
 
 def _beyond(joints: Array, bounds: Array) -> Array:

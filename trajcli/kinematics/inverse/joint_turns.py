@@ -12,6 +12,7 @@ from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.robot import Robot
 
 FULL = 2.0 * np.pi
+_FEW = 4096  # values of a joint up to which all joints are moved together
 
 
 def widened(bounds: Array) -> Array:
@@ -44,20 +45,23 @@ def choose_turns(robot: Robot, joints: Array, near: Array | None, within: float 
         near: Joint values.
         within: Bound of the revolute joints' absolute values, rad: spares those with wider limits the search.
     """
-    wide = widened(robot.limits.position)
-    for i in np.flatnonzero(revolute(robot)):
-        low, high = wide[i]
-        if near is None and within <= np.pi and low <= -within and within <= high:
-            continue
-        values, aim = joints[i], np.asarray(0.0 if near is None else near[i])
+    wide, turning = widened(robot.limits.position)[..., None, None], revolute(robot)
+    if near is None and within <= np.pi:
+        turning &= (wide[:, 0, 0, 0] > -within) | (within > wide[:, 1, 0, 0])
+    some = np.flatnonzero(turning)
+    for part in [some] if joints[0].size <= _FEW else [slice(i, i + 1) for i in some]:
+        values, low, high = joints[part], wide[part, 0], wide[part, 1]
+        aim = np.zeros((len(values), 1, 1)) if near is None else near[part][:, None]
         outside = values < np.maximum(low, aim - np.pi)
         outside |= values > np.minimum(high, aim + np.pi)
         if outside.any():
-            aims = np.broadcast_to(aim, values.shape)[outside]
-            values[outside] = _wrapped(values[outside], aims, low, high)
+            rows, _, poses = np.nonzero(outside)
+            aims = aim[rows, 0, poses if near is not None else 0]
+            values[outside] = _wrapped(values[outside], aims, low[rows, 0, 0], high[rows, 0, 0])
+            joints[part] = values
 
 
-def _wrapped(values: Array, aims: Array, low: float, high: float) -> Array:
+def _wrapped(values: Array, aims: Array, low: Array, high: Array) -> Array:
     """Return values (K,) in the turn nearest to their aims inside the limits, or with the smallest excess."""
     first, last = np.ceil((low - values) / FULL), np.floor((high - values) / FULL)
     wanted = np.round((aims - values) / FULL)

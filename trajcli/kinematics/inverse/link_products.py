@@ -105,9 +105,8 @@ def poses_and_jacobians(robot: Robot, q: Array) -> tuple[Array, Array]:
     up, origin = frames[..., :3, 2:].T  # each (3, K, n + 1)
     axes, arms = up[..., :-1] * known.sign, origin[..., -1:] - origin[..., :-1]
     jacobians = np.empty((len(q), 6, len(values)))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        jacobians[:, i] = axes[j] * arms[k] - axes[k] * arms[j]
-        jacobians[:, 3 + i] = axes[i]
+    moments = axes[[1, 2, 0]] * arms[[2, 0, 1]] - axes[[2, 0, 1]] * arms[[1, 2, 0]]
+    jacobians[:, :3], jacobians[:, 3:] = moments.swapaxes(0, 1), axes.swapaxes(0, 1)
     if known.slides:
         jacobians[:, :3] = np.where(known.sliding, jacobians[:, 3:], jacobians[:, :3])
         jacobians[:, 3:] = np.where(known.sliding, 0.0, jacobians[:, 3:])

@@ -187,8 +187,10 @@ def distinct(robot: Robot, joints: Array, usable: Flags, within: float = SAME) -
         within: How far two that are one may be apart, rad or m.
     """
     turning = revolute(robot)
-    keep = usable.copy()
+    keep, key = usable.copy(), np.cos(joints - 1.0).sum(axis=2)  # alike where joints are
     for i in np.flatnonzero(usable[:, 1:].any(axis=0)) + 1:
+        if np.abs(key[:, :i] - key[:, i, None]).min() > 2.0 * within * len(turning):
+            continue
         gap = joints[:, :i] - joints[:, i, None]
         gap = np.where(turning, gap - FULL * np.round(gap / FULL), gap)
         same = (np.abs(gap).max(axis=-1) <= within) & keep[:, :i]

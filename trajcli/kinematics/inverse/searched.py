@@ -147,7 +147,7 @@ def _one_of_each_family(robot: Robot, target: IkTarget, joints: Array, valid: Fl
 
 def _ordered(array: NDArray[Any], order: NDArray[np.intp]) -> NDArray[Any]:
     """Return (..., branches, N) with the branches of each pose in an order (kept, N)."""
-    return np.take_along_axis(array, order.reshape(*(1,) * (array.ndim - 2), *order.shape), axis=-2)
+    return np.asarray(array[..., order, np.arange(order.shape[1])])
 
 
 def resolve_suspects(
@@ -167,7 +167,8 @@ def resolve_suspects(
     before = answers.joints[:, :, suspects].transpose(2, 1, 0)
     joints, valid = before.copy(), answers.valid[:, suspects].T.copy()
     some_singular, some_free = _self_motions_of(robot, some, joints, valid, answers.freedom, nearby)
-    valid = distinct(robot, joints, valid)
+    if not answers.freedom:  # the nearest points are distinct
+        valid = distinct(robot, joints, valid)
     if (
         answers.closed_form
         and not answers.freedom
