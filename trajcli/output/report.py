@@ -61,7 +61,6 @@ _HELD = 0.999  # of the wanted speed: that much counts as holding it
 _EACH = 16  # times of a piece of the law at which its speed is looked at
 _NEAR = 0.02  # of the duration: a limit that binds as near as this is the reason
 _AT_REST = 1e-6  # SI: a tool that turns, or moves, less than that does not
-_RATES = ("", "/s", "/s^2", "/s^3")
 
 
 def report_of(

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.collocation import IntervalRows
 from trajcli.curves.time_optimal.constraints import JointConstraint
-from trajcli.curves.time_optimal.maximum_velocity import largest_in_intervals, maximum_velocity_curve
+from trajcli.curves.time_optimal.passes import largest_in_intervals, maximum_velocity_curve
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.job.read import job_from_text, load_job
 from trajcli.planning.plan import plan_job

@@ -7,11 +7,15 @@ import pytest
 from topp_paths import random_bounds, spline
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal import recurrence as recurrence_module
+from trajcli.curves.time_optimal import passes
 from trajcli.curves.time_optimal.collocation import interval_rows
 from trajcli.curves.time_optimal.constraints import JointConstraint
-from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
-from trajcli.curves.time_optimal.passes import UnreachableSpeedError, solve, solve_locally
+from trajcli.curves.time_optimal.passes import (
+    UnreachableSpeedError,
+    maximum_velocity_curve,
+    solve,
+    solve_locally,
+)
 
 
 def recurrence(P, R, C, chosen, limits):
@@ -25,8 +29,8 @@ def recurrence(P, R, C, chosen, limits):
 @pytest.mark.parametrize("count", [1, 2, 50, 700])
 @pytest.mark.parametrize(("many", "block"), [(0, 8192), (1000, 8192), (0, 100), (1000, 33)])
 def test_both_ways_are_the_recurrence(monkeypatch, count, many, block):
-    monkeypatch.setattr(recurrence_module, "_MANY", many)
-    monkeypatch.setattr(recurrence_module, "_BLOCK", block)
+    monkeypatch.setattr(passes, "_MANY", many)
+    monkeypatch.setattr(passes, "_BLOCK", block)
     rng = np.random.default_rng(count)
     P, C = rng.normal(-0.6, 0.6, (5, count)), rng.uniform(0, 0.3, (5, count))
     R, limits = rng.uniform(0.5, 1.5, (5, count)), rng.uniform(0.2, 3, count + 1)
@@ -36,17 +40,17 @@ def test_both_ways_are_the_recurrence(monkeypatch, count, many, block):
     limits[rng.random(count + 1) < 0.1] = np.inf
     limits[0] = 0.4
     np.testing.assert_array_equal(
-        recurrence_module.solve_recurrence(P, R, C, chosen, limits), recurrence(P, R, C, chosen, limits)
+        passes.solve_recurrence(P, R, C, chosen, limits), recurrence(P, R, C, chosen, limits)
     )
 
 
 @pytest.mark.parametrize("many", [0, 1000])
 def test_a_line_that_is_lowest_at_the_largest_value_only_counts(many, monkeypatch):
     """From 2 on: of 1 and 2.4 - z the second is 0.4, below the limit of 0.5 behind; at 0.5 it would be 1.9."""
-    monkeypatch.setattr(recurrence_module, "_MANY", many)
+    monkeypatch.setattr(passes, "_MANY", many)
     P, C = np.array([[0.0, 0.0], [1.0, 1.0]]), np.array([[1.0, 1.0], [2.4, 2.4]])
     chosen = np.ones((2, 2), dtype=bool)
-    found = recurrence_module.solve_recurrence(P, np.ones((2, 2)), C, chosen, np.array([2.0, 0.5, 9.0]))
+    found = passes.solve_recurrence(P, np.ones((2, 2)), C, chosen, np.array([2.0, 0.5, 9.0]))
     np.testing.assert_allclose(found, [2.0, 0.4, 1.0], rtol=1e-15)
 
 
@@ -112,13 +116,13 @@ def test_braking_that_is_felt_up_to_the_second_point_is_not_found_locally(place)
 @pytest.mark.parametrize("sweeps", [1, 3, 50])
 def test_what_chunks_abreast_leave_open_is_the_recurrence(monkeypatch, sweeps):
     """Sums from the first value on: no chunk is right before the one in front of it is."""
-    monkeypatch.setattr(recurrence_module, "_MANY", 0)
-    monkeypatch.setattr(recurrence_module, "_SWEEPS", sweeps)
+    monkeypatch.setattr(passes, "_MANY", 0)
+    monkeypatch.setattr(passes, "_SWEEPS", sweeps)
     rng = np.random.default_rng(8)
     C, limits = rng.uniform(-0.02, 0.02, (1, 400)), np.full(401, np.inf)
     limits[0] = 5.0
     steps = -np.ones((1, 400)), np.ones((1, 400)), C, np.ones((1, 400), dtype=bool)
-    found = recurrence_module.solve_recurrence(*steps, limits)
+    found = passes.solve_recurrence(*steps, limits)
     np.testing.assert_array_equal(found, recurrence(*steps, limits))
     np.testing.assert_allclose(found[1:], 5.0 + np.cumsum(C), rtol=1e-12)
 

@@ -17,12 +17,12 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
 from trajcli.curves.time_optimal.accelerations import end_accelerations
 from trajcli.curves.time_optimal.collocation import IntervalRows, interval_rows
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint, corners, is_at_rest
-from trajcli.curves.time_optimal.maximum_velocity import maximum_velocity_curve
 from trajcli.curves.time_optimal.passes import (
     Speeds,
     StandstillError,
     UnlimitedSpeedError,
     UnreachableSpeedError,
+    maximum_velocity_curve,
     solve,
     solve_locally,
 )

@@ -1,8 +1,7 @@
-"""Refinement of the grid: the time that each interval loses, where to cut it, and its sdd ramp.
+"""Refinement of the grid: the time that each interval loses, and where to cut it.
 
 A solution that loses no time has in each interval sd^2 on the maximum velocity curve, or sdd as large or as
-small as the limits allow at both ends. So the sdd ramp of an interval is chosen such that what binds at its
-near end binds at its far end, too; what remains unused tells where more grid points pay.
+small as the limits allow at both ends: what remains unused tells where more grid points pay.
 """
 
 from __future__ import annotations
@@ -33,8 +32,6 @@ _ROUND = 0.25  # of the triangle above an interval: what a smooth peak holds
 _SHORT = 64  # times shorter than the first intervals of a piece: there rounding is not far
 _SPARING = 1.1  # by which the loss to be reached grows until there is room
 _SOFT = 1e-9  # by which rows are relaxed, so that those with next to no say in sdd have none by rounding
-_BINDS = 1e-6  # of sdd: as near to its bound is at it
-_SHARE = 0.5  # of what rows have room for at rest, and of what the speed stays positive with
 
 
 def first_grid(path: PiecewisePolynomial) -> Array:
