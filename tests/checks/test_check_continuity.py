@@ -180,6 +180,27 @@ def test_an_acceleration_of_a_rounding_is_zero() -> None:
     assert [s.move for s in steps_of(whole)] == [0, 0]
 
 
+@pytest.mark.parametrize(
+    ("share", "owned"), [(0.4, False), (0.6, True), (1.8, True), (-0.4, False), (-1.8, True)]
+)
+@pytest.mark.parametrize("later", [True, False])
+def test_half_of_what_rounding_explains_is_an_acceleration_of_zero(
+    later: bool, share: float, owned: bool
+) -> None:
+    """The cubic, whose acceleration is 6 at its ends, is free; the quintic ends, or begins, with nearly none."""
+    states = np.zeros((3, 2, 1))
+    states[0] = [[1.0], [2.0]]
+    states[2, 0 if later else 1] = share * 6e-9
+    quintic = hermite_pieces([0.0, 1.0], states)
+    if later:
+        whole = trajectory(cubics(0.0, 1.0)[0], quintic)
+        found = check_continuity(whole, [FREE, LIMITED])
+    else:
+        whole = trajectory(quintic, cubics(2.0, 3.0)[0])
+        found = check_continuity(whole, [LIMITED, FREE])
+    assert [(each.move, each.kind) for each in found] == [(int(later), "acceleration_jump")] * owned
+
+
 def test_a_move_joined_with_the_same_acceleration_does_not_step() -> None:
     parts = [
         PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0.0, 0.0])[:, None, None]),
@@ -217,6 +238,19 @@ def test_a_steep_ramp_is_not_a_jump(acceleration: float) -> None:
     assert len(steps_of(whole)) == 4
 
 
+@pytest.mark.parametrize("speed", [1e13, -1e13])
+@pytest.mark.parametrize("before", [True, False])
+def test_a_position_is_late_by_the_slope_on_either_side_of_its_break(before: bool, speed: float) -> None:
+    """By a unit in the last place of the break at 1 s, times a slope that is there on one side alone, and shortly."""
+    late = speed * np.spacing(1.0)
+    border = 1.0 - 1e-14 if before else 1.0 + 1e-14
+    way = speed * abs(border - 1.0)
+    heights = [2.0, 2.0, 2.0 + way + late] if before else [2.0, 2.0 + late, 2.0 + late + way]
+    breaks = np.array([0.0, *sorted([1.0, border]), 2.0])
+    curve = PiecewisePolynomial(breaks, np.array([[0.0, speed, 0.0], heights])[:, :, None])
+    assert [each.kind for each in judge(curve) if each.kind == "position_jump"] == []
+
+
 def test_a_jump_beside_a_ramp_that_is_not_steep_is_a_jump() -> None:
     """The last ramp at 1e15 misses its end by 0.1 of the speed, which its break explains; at 1e9 nothing does."""
     steep = steep_trapezoid(1e15)
@@ -245,6 +279,15 @@ def test_moves_of_no_length_own_no_jump() -> None:
     hold = constant([1.0], 0.0)
     whole = trajectory(between([0.0], [1.0]), hold, hold, between([1.25], [2.0]), hold)
     assert [f.move for f in check_continuity(whole, [FREE] * 5)] == [3]
+
+
+@pytest.mark.parametrize("units", [-2, 0, 2])
+def test_a_jump_is_the_later_moves_though_borders_are_rounded(units: int) -> None:
+    plain = trajectory(between([0.0], [1.0]), between([1.5], [2.0]))
+    border = 2.0 + units * np.spacing(2.0)
+    spans = (replace(plain.spans[0], end=border), replace(plain.spans[1], start=border))
+    (found,) = check_continuity(replace(plain, spans=spans), [FREE, FREE])
+    assert (found.move, found.kind, found.time) == (1, "position_jump", 2.0)
 
 
 def test_times_count_from_the_start_of_the_trajectory() -> None:

@@ -10,12 +10,13 @@ from random_jobs import loaded
 from trajcli.checks import target
 from trajcli.checks.target import check_targets
 from trajcli.checks.verify import verify
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import PlanningError
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import partial_target, pose_target
 from trajcli.planning.plan import plan_job
-from trajcli.trajectory import Destination, Promise, Trajectory
+from trajcli.trajectory import Destination, Promise, Trajectory, resting
 
 END = np.array([0.9, -1.0, 1.2, -0.7, -1.4, 0.3])
 BEGIN = END + 0.2
@@ -158,3 +159,33 @@ def test_on_a_path_joints_are_met_as_well_as_the_tool_tells(off: float, found: i
 def test_as_many_promises_as_moves_are_asked_for() -> None:
     with pytest.raises(ValueError, match="2 promises for 1 moves"):
         check_targets(swing(), [Promise(), Promise()])
+
+
+@pytest.mark.parametrize("kind", ["joints", "pose", "pinned"])
+def test_a_motion_that_ends_at_infinity_ends_in_no_target(kind: str) -> None:
+    curve = between(BEGIN.tolist(), END.tolist())
+    coefficients = curve.coefficients.copy()
+    coefficients[0, -1, 3] = 1e308  # times 2^5
+    whole = trajectory(
+        PiecewisePolynomial(curve.breaks, coefficients), start=resting(BEGIN), end=resting(END)
+    )
+    pose = pose_target(forward(ROBOT, END))
+    promises = {
+        "joints": Promise(destination=Destination(END)),
+        "pose": Promise(robot=ROBOT, destination=Destination(None, pose)),
+        "pinned": Promise(
+            robot=ROBOT, destination=Destination(None, pose, (np.inf, np.inf), {3: float(END[3])})
+        ),
+    }
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = check_targets(whole, [promises[kind]])
+    assert {each.kind for each in found} == {"target"}
+    assert "j4" in {each.joint for each in found} if kind != "pose" else len(found) == 2
+
+
+def test_of_joints_within_and_beyond_their_tolerance_one_beyond_is_named() -> None:
+    """A billionth of the target is allowed, and of one at least: the first one is off by less, the second by more."""
+    wanted = np.array([1000.0, 1.0])
+    mutant = wanted + np.array([9e-7, 5e-9])
+    (found,) = check_targets(trajectory(between([0.0, 0.0], mutant.tolist())), to_joints(wanted))
+    assert (found.joint, found.value) == ("j2", pytest.approx(5e-9, rel=1e-5))

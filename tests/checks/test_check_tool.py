@@ -25,6 +25,7 @@ from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits, unlimited
 from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.tool import ToolFamily
+from trajcli.limits.tool_bound import SpeedRun
 from trajcli.planners.tool_path.follow import followed
 from trajcli.trajectory import Promise, Span, Trajectory, resting
 
@@ -424,6 +425,20 @@ def test_a_tool_that_is_just_as_fast_as_a_segment_allows_passes(which: str, shar
     limited_path = dataclasses.replace(path, speeds=SpeedLimits(borders, (0, 1), *of_speed))
     rows = dataclasses.replace(RIGHT, motion=dataclasses.replace(RIGHT.motion, path=limited_path))
     assert len(list(_check_speeds(rows))) == count
+
+
+def test_a_speed_that_nobody_knows_is_none_that_a_segment_allows() -> None:
+    rows = dataclasses.replace(RIGHT)
+    unknown = dataclasses.replace(RIGHT.peaks["speed"], upper_bound=np.nan)
+    vars(rows)["speed_runs"] = (SpeedRun((0, 0), (0.0, 1.0), (0.0, 1.0), (1.0, 1.0), (unknown, unknown)),)
+    assert [each.kind for each in _check_speeds(rows)] == ["tool_speed", "tool_angular_speed"]
+
+
+def test_a_tool_is_looked_at_from_its_start_to_its_end() -> None:
+    times, breaks = RIGHT.times, RIGHT.trajectory.curve.breaks
+    assert (np.diff(times) > 0).all()
+    assert set(breaks.tolist()) <= set(times.tolist())
+    assert (times[0], times[-1]) == (0.0, DURATION)
 
 
 def test_a_branch_and_a_bound_have_the_times_of_the_whole():

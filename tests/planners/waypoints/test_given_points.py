@@ -7,19 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 
 import trajcli
 from trajcli.errors import MissingLimitError, PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.language.recorded import SAME_POSITION
+from trajcli.planners.planner import Planned
 from trajcli.planners.waypoints.given_points import (
     GivenPoints,
     given_points,
     require_possible,
     without_repeats,
 )
-from trajcli.trajectory import State, resting
+from trajcli.trajectory import State, ViaPoints, resting
 
 LOW, HIGH, JERK = -1.0, 2.0, (-10.0, 20.0)
 """Limits of velocity and jerk by direction; of jerk the smaller one counts."""
@@ -219,3 +221,44 @@ def test_only_a_motion_from_rest_has_a_path(joint: int, sign: int, name: str) ->
         else:
             course = planner.course(np.zeros(2), robot, plan.moves[0].planned)
             assert course is not None
+
+
+def waypoints_of(count: int, **last: object) -> object:
+    """Return the planner of a move through some points."""
+    through = [{"joints": [0.1 * (k + 1), 0.05 * (-1) ** k]} for k in range(count)]
+    through[-1] |= last
+    return job_from_text(json.dumps(job(through))).job.moves[0]
+
+
+@pytest.mark.parametrize(
+    ("order", "size", "refused"), [(1, 1e-8, True), (1, 1e-10, False), (2, 1e-8, True), (2, 1e-10, False)]
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_start_is_at_rest_to_a_billionth_of_the_largest_rates_of_its_motion(
+    sign: float, order: int, size: float, refused: bool
+) -> None:
+    """Far from zero and in a short time: positions and jerks are no measure of it."""
+    t = np.array([0.0, 0.01, 0.02, 0.03])
+    states = np.zeros((3, 4, 2))
+    states[0] = 1000.0 + np.array([[0.0, 0.0], [1.0, 0.5], [2.0, 0.0], [3.0, 1.0]])
+    states[1, 1:3, 0] = 100.0
+    largest = np.abs(hermite_pieces(t, states).piece_ends(order)).max() or 1e4
+    states[order, 0, 1] = sign * size * largest
+    curve = hermite_pieces(t, states)
+    planned = Planned(curve, resting(states[0, -1]), via_points=ViaPoints(t, states[0], np.zeros((4, 2))))
+    if refused:
+        with pytest.raises(PlanningError, match="starts in motion"):
+            waypoints_of(3).course(np.zeros(2), robot(), planned)
+        return
+    passed = waypoints_of(3).course(np.zeros(2), robot(), planned).passed
+    np.testing.assert_array_equal(passed.points, states[0, 1:-1])
+    assert passed.s.shape == (2,)
+    assert passed.missed.shape == (2, 2)
+
+
+def test_the_last_point_says_whether_a_motion_may_fly_by() -> None:
+    for count in (1, 2, 3, 4):
+        assert waypoints_of(count).why_not_flown_by is None
+        assert waypoints_of(count, velocity=[0.0, 0.0]).why_not_flown_by is None
+        assert waypoints_of(count, velocity=[0.0, -0.1]).why_not_flown_by == "it ends in motion"
+        assert waypoints_of(count, acceleration=[0.1, 0.0]).why_not_flown_by == "it ends in motion"
