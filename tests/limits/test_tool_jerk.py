@@ -6,6 +6,7 @@ A link of length L that turns by q has |p'''|^2 = L^2 ((q''' - q'^3)^2 + (3 q' q
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,14 @@ from tiers import few
 
 from trajcli.job.report import Report
 from trajcli.judge.file import CheckOptions, check_file
+from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
+from trajcli.limits.kinds import TOOL_KINDS
+from trajcli.limits.tool import ToolFamily, ToolStep, ToolSurvey
+from trajcli.limits.tool_bound import ToolPeak
 from trajcli.output.report import report_of
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
+from trajcli.trajectory import State
 
 LEVER, DURATION, TURN = 0.5, 1.6, 1.2
 THIRD = ["jerk", "angular_jerk"]
@@ -214,3 +220,56 @@ def test_a_law_at_a_limit_keeps_it_whatever_the_tolerance_of_its_path_is(planner
     plan = plan_job(loaded(job))
     assert plan.verdict.passed
     assert 1 - 1e-6 < used(plan, "speed") < 1 + 1e-6
+
+
+def survey_of(steps: tuple[ToolStep, ...], uses: dict[str, float], moves: bool = True) -> ToolSurvey:
+    """Return what a move uses of limits of one, all of them stated."""
+    limits = replace(unlimited(1), tcp=ToolLimits(*[1.0] * 6))
+    peaks = {kind.key: ToolPeak(0.5, 0.25, uses.get(kind.key, 0.5), np.zeros(3)) for kind in TOOL_KINDS}
+    return ToolSurvey(limits, peaks, steps, 10.0, moves)
+
+
+ONE = Robot("link", (Joint("j1", a=LEVER),), unlimited(1), "standard", np.eye(4), np.eye(4))
+KIND_OF = {kind.key: kind for kind in TOOL_KINDS}
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_step_stands_in_the_place_of_the_jerk_of_its_own_kind_alone(turns: bool) -> None:
+    """A jerk is not bounded where the acceleration steps; speeds, accelerations and the other jerk are."""
+    uses = {kind.key: 2.0 for kind in TOOL_KINDS}
+    stepping, instead = ("angular_acceleration", "angular_jerk") if turns else ("acceleration", "jerk")
+    survey = survey_of((ToolStep(KIND_OF[stepping], 3.0, 0.75),), uses)
+    found = {finding.kind: finding for finding in survey.over(ONE)}
+    assert len(list(survey.over(ONE))) == 6
+    assert set(found) == {f"tool_{key}" for key in uses if key != instead} | {f"tool_{stepping}_jump"}
+    step = found[f"tool_{stepping}_jump"]
+    assert (step.value, step.limit, step.time) == (3.0, 0.0, 10.75)
+    assert survey.excess() == np.inf
+    assert {found[kind].time for kind in found if not kind.endswith("jump")} == {10.25}
+
+
+@pytest.mark.parametrize("key", KIND_OF)
+def test_each_limit_of_the_tool_is_judged_by_itself(key: str) -> None:
+    survey = survey_of((), {key: 2.0})
+    (finding,) = survey.over(ONE)
+    assert (finding.kind, finding.value, finding.limit) == (f"tool_{key}", 2.0, 1.0)
+    assert finding.factor == pytest.approx(2.0 ** (1 / (KIND_OF[key].order or 1)))
+    assert survey.excess() == 1.0
+    (still,) = survey_of((), {key: 2.0}, moves=False).over(ONE)
+    assert still.factor is None
+    assert [each.kind for each in survey_of((), {key: np.nan}).over(ONE)] == [f"tool_{key}"]
+    assert list(survey_of((), {key: 1.0 + 0.9e-6}).over(ONE)) == []
+
+
+@pytest.mark.parametrize(
+    ("limits", "over"), [((0.9, 2.1), True), ((1.1, 1.9), True), ((1.1, 2.1), False), ((0.9, 1.9), True)]
+)
+@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_tool_that_is_too_fast_at_an_end_is_so_by_its_speed_or_its_turning(
+    sign: float, end: int, limits: tuple[float, float], over: bool
+) -> None:
+    """At 2 rad/s a link of half a metre moves its end at 1 m/s."""
+    arm = replace(ONE, limits=replace(unlimited(1), tcp=ToolLimits(speed=limits[0], angular_speed=limits[1])))
+    states = [State(np.zeros(1), np.array([sign * 2.0 * (k == end)]), np.zeros(1)) for k in range(2)]
+    assert ToolFamily().over_at_ends(arm, states, ("tool_speed", 0, 1.0)) is over
