@@ -288,3 +288,16 @@ def test_what_was_left_out_and_that_faster_times_may_exist_are_told(monkeypatch:
     assert [event.kind for event in planned.events] == ["merged", "local_optimum"]
     assert planned.via_points is not None
     assert planned.via_points.times.tolist() == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize("last", ["to", "through"])
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_a_blend_is_refused_where_it_stands(last: str, at: int) -> None:
+    through: list[dict[str, Any]] = [{"joints": [1.0 + k], "time": 1.0 + k} for k in range(3)]
+    through[at]["blend"] = 0.125
+    move: dict[str, Any] = {"planner": "spline", "through": through}
+    if last == "to":
+        move["to"] = through.pop()
+    (problem,) = refusal({"joints": [0.0]}, move).problems
+    assert problem.place is not None
+    assert problem.place.source[problem.place.column - 1 :].startswith("0.125")
