@@ -8,6 +8,7 @@ turn of the outstretched arm counts as much in position as in orientation.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -90,6 +91,7 @@ def singular_directions(robot: Robot, q: ArrayLike) -> SingularDirections:
     return SingularDirections(left[:, rank:].T + 0.0, right[rank:] + 0.0, length)
 
 
+@lru_cache(maxsize=16)
 def characteristic_length(robot: Robot) -> float:
     """Return the sum of |a| and |d| of all rows and of the length of the tool, m; 1 where that is zero."""
     lengths = [abs(joint.a) + abs(joint.d) for joint in robot.joints]

@@ -155,7 +155,7 @@ def _chosen(values: Array, index: NDArray[np.intp]) -> Array:
 
 
 def _beyond(joints: Array, bounds: Array) -> Array:
-    return np.moveaxis(beyond(np.moveaxis(joints, 0, -1), bounds), -1, 0)
+    return beyond(joints.T, bounds).T
 
 
 class _Slide:
@@ -221,10 +221,10 @@ class _Slide:
         wanted, compute = self._poses[rows], poses_and_jacobians if len(rows) <= FEW else linearisation
         poses, slopes = compute(self._robot, q)
         turned = wanted[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)
-        turned -= np.swapaxes(turned, 1, 2).copy()
         errors = np.empty((len(rows), 6))
         errors[:, :3] = (wanted[:, :3, 3] - poses[:, :3, 3]) / self._length
-        errors[:, 3:] = 0.5 * turned[(slice(None), *_ABOUT_AXES)]  # the sine of a small turn, about its axis
+        low, high = _ABOUT_AXES  # the sine of a small turn, about its axis
+        errors[:, 3:] = 0.5 * (turned[:, low, high] - turned[:, high, low])
         slopes[:, :3] /= self._length
         return np.abs(errors).max(axis=1), *_correction_and_null(errors, slopes)
 

@@ -17,8 +17,7 @@ _FEW = 4096  # values of a joint up to which all joints are moved together
 
 def widened(bounds: Array) -> Array:
     """Return position limits (n, 2) with the tolerance of a limit added."""
-    slack = np.where(np.isfinite(bounds), np.abs(bounds) * 1e-9 + 1e-12, 0.0)
-    return np.asarray(bounds + slack * [-1.0, 1.0])
+    return np.asarray(bounds + (np.abs(bounds) * 1e-9 + 1e-12) * [-1.0, 1.0])
 
 
 def beyond(joints: Array, bounds: Array) -> Array:

@@ -116,7 +116,8 @@ def _with_names(answers: Answers, postures: Postures) -> Answers:
 
 def _batch_first(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
     """Return (k, branches, N) as a view (*batch, branches, k)."""
-    return np.moveaxis(array.reshape(*array.shape[:2], *batch), (0, 1), (-1, -2))
+    shaped = array.reshape(*array.shape[:2], *batch)
+    return shaped.transpose(*range(2, shaped.ndim), 1, 0)
 
 
 def fits(method: IkMethod, target: IkTarget, base: Array) -> bool:

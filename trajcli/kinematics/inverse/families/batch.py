@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import cast
 
 import numpy as np
@@ -100,7 +101,7 @@ def candidates(
     count, twos = len(poses), (2,) * len(method.choices)
     joints, residuals = np.empty((len(robot.joints), *twos, count)), np.empty((2, *twos, count))
     degenerate = np.zeros(count, dtype=bool)
-    order, check, solve = _order(method), ResidualCheck(robot), method.solve
+    order, check, solve = _order(method), _residual_check(robot), method.solve
     # the same memory with the choices in the order of the solver: (n or 2, last choice, ..., first choice, N)
     solved, missed, flat = joints.transpose(order), residuals.transpose(order), poses.reshape(-1, 16)
     branches = 2 ** len(twos)
@@ -125,8 +126,8 @@ def candidates(
 
 def _each(work: Callable[[slice], None], blocks: Sequence[slice]) -> None:
     """Work on all blocks, in threads where there are many: numpy computes without the interpreter's lock."""
-    threads = min(os.cpu_count() or 1, len(blocks) // _EACH)
-    if threads < 2:
+    threads = len(blocks) // _EACH
+    if threads < 2 or (threads := min(os.cpu_count() or 1, threads)) < 2:
         for block in blocks:
             work(block)
         return
@@ -229,6 +230,11 @@ class ResidualCheck:
         local = advance(point, -a, _X)
         local = turned_back(local, _X, (twist[0], twist[1]))
         return turned_back(minus(local, scaled(distance, _Z)), _Z, turn)
+
+
+@lru_cache(maxsize=16)
+def _residual_check(robot: Robot) -> ResidualCheck:
+    return ResidualCheck(robot)
 
 
 class _Frame:

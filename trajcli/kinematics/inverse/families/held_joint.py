@@ -16,6 +16,7 @@ manipulators with unconventional design (ICCMA 2021), here from screw axes inste
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -49,6 +50,14 @@ def poses_for_the_others(robot: Robot, poses: Array, last: Array) -> Array:
         poses: T_world_tcp, shape (N, 4, 4).
         last: Shape (N,), rad.
     """
+    fixed, along, across = _parts_of_change(robot)
+    change = np.cos(last)[:, None, None] * along + np.sin(last)[:, None, None] * across + fixed
+    return np.asarray(poses @ change)
+
+
+@lru_cache(maxsize=16)
+def _parts_of_change(robot: Robot) -> tuple[Array, Array, Array]:
+    """Return what is fixed, times the cosine and times the sine of the last joint, each (4, 4)."""
     link = links_of(robot)[-1]
     a, cosine, sine = link.after
     after = np.array([[1.0, 0, 0, a], [0, cosine, -sine, 0], [0, sine, cosine, 0], [0, 0, 0, 1.0]])
@@ -56,6 +65,4 @@ def poses_for_the_others(robot: Robot, poses: Array, last: Array) -> Array:
     back = np.linalg.inv(tip)
     turning, quarter = np.diag([1.0, 1.0, 0.0, 0.0]), np.zeros((4, 4))
     quarter[0, 1], quarter[1, 0] = 1.0, -1.0
-    fixed, along, across = (back @ part @ tip for part in (np.eye(4) - turning, turning, link.sign * quarter))
-    change = np.cos(last)[:, None, None] * along + np.sin(last)[:, None, None] * across + fixed
-    return np.asarray(poses @ change)
+    return back @ (np.eye(4) - turning) @ tip, back @ turning @ tip, back @ (link.sign * quarter) @ tip
