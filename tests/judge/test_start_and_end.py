@@ -369,3 +369,11 @@ def test_between_two_moves_the_looser_limits_by_position_are_in_force(first: boo
     by_move = dict(enumerate(map(bare_robot, limits if first else limits[::-1])))
     between = Requirements(by_move[0], by_move=by_move).robot_between(0, 1).limits
     assert between.velocity_by_position.tolist() == [[20.0, 0.1], [20.0, 0.1], none]
+
+
+@pytest.mark.parametrize("row", [0, 3])
+@pytest.mark.parametrize(("name", "by"), [("q", 0.01), ("qd", -0.1)])
+def test_all_joints_that_are_elsewhere_are_counted(name: str, by: float, row: int) -> None:
+    both = moved(moved(motion(), name, row, 0, by), name, row, 2, -2 * by)
+    (found,) = states_of(both)
+    assert (found.joint, found.count) == ("j3", 2)
