@@ -54,6 +54,7 @@ def test_one_effort_among_none_is_one() -> None:
     tau[4, 2] = 0.5
     found = judged(replace(JTC, tau=tau), "ros-jtc", Surroundings(JTC.joints, JTC.q[0])).findings
     assert [(finding.rule, finding.row) for finding in found] == [("jtc-effort", 5)]
+    assert "`tau` out of `columns`" in (found[0].hint or "")
 
 
 @SIDES

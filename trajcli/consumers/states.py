@@ -147,7 +147,7 @@ class EffortAbsent(RuleCheck):
                 "value": float(rows.tau[index].size) if rows.tau is not None else 0.0,
                 "limit": 0.0,
                 "message": f"the point {when(rows, index)} has efforts",
-                "hint": "leave `effort` empty in every point",
+                "hint": "leave `effort` empty in every point, in a job `tau` out of `columns`",
             }
 
         self.note_times(rows, given, -rows.t, fields)
