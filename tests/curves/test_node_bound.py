@@ -163,6 +163,18 @@ def test_a_remainder_that_no_float_holds_is_not_worth_halving():
     assert len(node_survey(known, pieces, lambda _: np.array([1.0]), 12).lengths) == 1
 
 
+@pytest.mark.parametrize(("given", "pieces"), [(1, 1 << 15), (4096, 1 << 17)])
+def test_halves_without_end_are_as_many_as_a_motion_is_worth(given, pieces):
+    def known(coefficients, lengths):
+        return np.ones((len(lengths), 9, 1, 1)), np.full((len(lengths), 1), 1e200)
+
+    whole = np.arange(float(given)), np.ones(given), np.zeros((1, given, 1))
+    survey = node_survey(known, whole, lambda _: np.array([1.0]), 18)
+    assert len(survey.lengths) == pieces
+    assert survey.lengths.sum() == pytest.approx(given)
+    assert (survey.remainder > 1.0).all()
+
+
 def test_a_slower_piece_that_is_less_well_known_counts_with_what_it_may_be():
     """A piece that rises to 1, and one that stays at 0.9 but may be beside that by 0.5."""
     rising, even = NODES**2, np.full(9, 0.9)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from counted_calls import calls_of
 from heavy_arms import random_arm, random_payload
 from scipy.optimize import minimize_scalar
 from tiers import few
@@ -342,6 +343,16 @@ def test_stretch_of_a_light_and_of_a_heavy_lift(scale):
     wanted = (8.0 + (64.0 + 80.0 * free) ** 0.5) / (2 * free)
     found = needed_stretch(survey, 0, 1, 60.0 * scale, 1e-6)
     assert found.factor == pytest.approx(wanted, rel=1e-2 if scale < 1 else 2e-6)
+
+
+def test_what_is_not_resolved_is_given_up_at_once():
+    """A remainder does not shrink in a slower motion: above the limit it is, whatever the stretch."""
+    survey = effort_survey(lift(), np.array([0.0, 1.0]), np.array([2.0, 0.0, 0.0])[:, None, None])
+    nodes = replace(survey.nodes, remainder=np.full_like(survey.nodes.remainder, 150.0))
+    vague = replace(survey, nodes=nodes)
+    assert needed_stretch(vague, 0, 1, 60.0, 0.0).factor == np.inf
+    once = calls_of(lambda: vague.peak(0, 1))
+    assert calls_of(lambda: needed_stretch(vague, 0, 1, 60.0, 0.0)) < 2 * once
 
 
 def test_no_stretch_helps_where_gravity_alone_is_over_the_limit():

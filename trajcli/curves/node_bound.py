@@ -28,6 +28,9 @@ BETWEEN_NODES = factorial(NODES_DEGREE) / 4 / NODES_DEGREE ** (NODES_DEGREE + 1)
 """Bounds the product of the distances from nine equidistant nodes of a piece of length 1."""
 
 _DIVISIONS, _MOST_PARTS = 24, 1 << 16
+_HALVES = (
+    1 << 14
+)  # more pieces are not halved, but where each is 16 of those given: what is left is a looser bound
 
 KnownAtNodes = Callable[[Array, Array], tuple[Array, Array]]
 """From coefficients (degree + 1, P, n) and lengths (P,) of pieces of the joints' curve: values of m functions
@@ -132,7 +135,7 @@ def node_survey(
     for _ in range(halvings):
         coarse = (found.remainder > slack(found.values)).any(axis=1)
         coarse &= np.isfinite(found.remainder).all(axis=1)
-        if not coarse.any():
+        if not coarse.any() or len(found.starts) > max(_HALVES, 16 * len(starts)):
             break
         half, early = found.lengths[coarse] / 2, coefficients[:, coarse]
         late = taylor_shift(early, np.broadcast_to(half[:, None], early.shape[1:]))

@@ -159,6 +159,8 @@ def needed_stretch(survey: EffortSurvey, joint: int, sign: int, limit: float, sl
         inertial, viscous = peak.parts[0] * factor**2, peak.parts[1] * factor
         if not 0.0 < free < np.inf or not np.isfinite(peak.value):
             break
+        if peak.upper_bound - peak.value > 2.0 * limit:
+            break  # of a motion that its pieces do not resolve nothing near is known, however slow
         root = viscous**2 + 4.0 * inertial * free
         if root < 0.0 or viscous + root**0.5 <= 0.0:
             break
