@@ -8,7 +8,7 @@ import pytest
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.third_order.jerk import JointJerkConstraint, LawJerkConstraint
 from trajcli.curves.third_order.path_limits import SHARES, LawLimits, sampled, time_lost
-from trajcli.curves.third_order.quartic_law import QuarticLaw
+from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
 from trajcli.curves.time_optimal.constraints import JointConstraint
 
 FREE = np.array([[-np.inf, np.inf]] * 2)
@@ -117,3 +117,9 @@ def test_a_law_at_its_limit_loses_nothing_and_one_that_is_over_loses_the_time_it
         excess[order, 1] = 1.01
         lost = time_lost(steady, limits, excess)
         np.testing.assert_allclose(lost, [0.0, cost * 0.01 * steady.lengths[1]], rtol=1e-6, atol=1e-9)
+
+
+def test_two_nodes_at_one_place_lead_nowhere() -> None:
+    twice = QuarticLaw(np.array([0.0, 0.5, 0.5, 1.0]), np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(4))
+    with pytest.raises(ReversingLawError, match=r"the law stands at s = .*0\.5"):
+        twice.calmed()

@@ -124,9 +124,12 @@ class QuarticLaw:
         """Return the law with less acceleration inside where it would go back.
 
         Raises:
-            ReversingLawError: When it would go back with the accelerations at its ends.
+            ReversingLawError: When it would go back with the accelerations at its ends, or nodes are one.
         """
-        law, rate = self, _CALM * 0.5 * (self.speed[1:] + self.speed[:-1]) / np.diff(self.s)
+        lengths = np.diff(self.s)
+        if not (lengths > 0).all():
+            raise ReversingLawError(f"the law stands at s = {self.s[int(np.argmin(lengths))]!r}")
+        law, rate = self, _CALM * 0.5 * (self.speed[1:] + self.speed[:-1]) / lengths
         most = self.speed * np.append(rate[0], rate), self.speed * np.append(rate, rate[-1])
         calm = np.clip(self.acceleration, -most[1], most[0])
         for turn in range(_CALMINGS):
