@@ -28,9 +28,7 @@ BETWEEN_NODES = factorial(NODES_DEGREE) / 4 / NODES_DEGREE ** (NODES_DEGREE + 1)
 """Bounds the product of the distances from nine equidistant nodes of a piece of length 1."""
 
 _DIVISIONS, _MOST_PARTS = 24, 1 << 16
-_HALVES = (
-    1 << 14
-)  # more pieces are not halved, but where each is 16 of those given: what is left is a looser bound
+_HALVES = 1 << 14  # pieces halved no more, or 16 times those given: their bound stays looser
 
 KnownAtNodes = Callable[[Array, Array], tuple[Array, Array]]
 """From coefficients (degree + 1, P, n) and lengths (P,) of pieces of the joints' curve: values of m functions
