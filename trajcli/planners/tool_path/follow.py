@@ -29,7 +29,6 @@ from trajcli.planners.planner import Event, Phase
 if TYPE_CHECKING:
     from trajcli.curves.time_optimal.phase_plane import PhasePlane
     from trajcli.kinematics.following.tool_path import ToolReference
-    from trajcli.kinematics.inverse.target import IkTarget
 
 _BISECTIONS = 20
 _SAMPLES = 17  # of the rest of the path, at which it is asked whether the arm reaches it
@@ -114,7 +113,7 @@ class FollowingDiagnosis:
         samples = np.linspace(at, self.end, _SAMPLES)
         samples[0] = min(at + _NEXT * self.end, self.end)
         reference = self.reference(samples, "left")
-        answers, shortfall = self._answers(reference, reference.target())
+        answers, shortfall = self._answers(reference)
         valid = np.array([len(joints) > 0 for joints in answers])
         if valid.all():
             return None
@@ -140,13 +139,14 @@ class FollowingDiagnosis:
             hint += f", or give only the `direction` of the tool's {axis} axis at the target"
         return UnreachablePathError(Problem(message, hint, amounts=amounts))
 
-    def _answers(self, reference: ToolReference, target: IkTarget) -> tuple[list[Array], Array]:
-        """Return the joint values (k, n) that meet each of N targets, and by how much it is missed, (N, 2).
+    def _answers(self, reference: ToolReference) -> tuple[list[Array], Array]:
+        """Return joint values (k, n) that meet each of N references, and by how much each is missed, (N, 2).
 
         They are those of the joints that are not pinned.
         """
         from trajcli.kinematics.inverse.solve import solve
 
+        target = reference.target()
         count = len(target.poses)
         parts = [slice(None)] if reference.pins is None else [slice(k, k + 1) for k in range(count)]
         found = [solve(self._arm(reference, part.start), target.rows(part), None) for part in parts]
@@ -169,7 +169,7 @@ class FollowingDiagnosis:
             return False
         for part in filter(len, (samples[:1], samples[1:])):  # failures cost most
             reference = replace(self.reference(part, "left"), orientation="direction")
-            answers, _ = self._answers(reference, reference.target())
+            answers, _ = self._answers(reference)
             if not all(len(joints) for joints in answers):
                 return False
         return True
