@@ -40,8 +40,9 @@ _CLOSED = 1e-8  # scaled error: after its correction the square is left
 _LONGEST = 0.2  # rad, of one step along the manifold
 _LEAST_CURVATURE = 0.05  # of half the squared distance along the manifold
 _AT_LIMIT = 1e-9  # rad: this near to its limit a joint is at it
-_ABOUT_AXES = (2, 0, 1), (1, 2, 0)  # entries of a turn's antisymmetric part
-_DAMPING = 1e-15  # keeps the correction of an exactly singular arm solvable
+_ABOUT_AXES = np.array([7, 2, 3])  # entries of a turn's antisymmetric part
+_DAMPING = 1e-15 * np.eye(6)  # keeps the correction of an exactly singular arm solvable
+_UNIT = np.eye(7)
 
 
 def points_by_held_joint(
@@ -172,7 +173,7 @@ class _Slide:
         inside = np.abs(beyond(start, robot.limits.position)).max(axis=1) < _LONGEST
         self._low = np.where(inside[:, None], low, np.minimum(low, start))
         self._high = np.where(inside[:, None], high, np.maximum(high, start))
-        self._bounds = np.stack([self._low, self._high])
+        self._bounds = np.stack([self._low, self._high], axis=1)
         self._length = characteristic_length(robot)
         self.joints = start.copy()
         self.settled: Flags = np.zeros(len(start), dtype=bool)
@@ -195,64 +196,69 @@ class _Slide:
 
     def _follow(self, rows: NDArray[np.intp], curvature: Array, rounds: int, range_of_last: float) -> None:
         """Move rows until they settle, or until their last joint has gone out of a range."""
-        start = self.joints[:, -1].copy()
+        poses, near, bounds, q = (of[rows] for of in (self._poses, self._near, self._bounds, self.joints))
+        first = q[:, -1]
         last: tuple[Array, Array, Array] | None = None  # null vectors, their parts of the gap, steps
         for _ in range(rounds):
-            error, correction, null = self._local(rows)
-            q = self.joints[rows] + correction
-            gap = np.einsum("kn,kn->k", null, self._near[rows] - q)
+            error, correction, null = self._local(poses, q)
+            q = q + correction
+            gap = np.einsum("kn,kn->k", null, near - q)
             if last is not None:
                 flipped = np.where(np.einsum("kn,kn->k", null, last[0]) < 0.0, -1.0, 1.0)
                 null, gap = null * flipped[:, None], gap * flipped
                 curvature = _secant(curvature, gap - last[1], last[2])
-            step = self._limited(rows, q, null, _short(gap / curvature))
-            self.joints[rows] = q + step[:, None] * null
-            going = (np.abs(step) > _LAST) | (error > _CLOSED)
-            self.settled[rows[~going]] = True
-            going &= np.abs(self.joints[rows, -1] - start[rows]) <= range_of_last
+            step = _limited(bounds, q, null, _short(gap / curvature))
+            q += step[:, None] * null
+            unsettled = (np.abs(step) > _LAST) | (error > _CLOSED)
+            going = unsettled & (np.abs(q[:, -1] - first) <= range_of_last)
+            if going.all():
+                last = null, gap, step
+                continue
+            self.joints[rows], self.settled[rows[~unsettled]] = q, True
             if not going.any():
                 return
             rows, curvature = rows[going], curvature[going]
+            poses, near, bounds, q, first = (of[going] for of in (poses, near, bounds, q, first))
             last = null[going], gap[going], step[going]
+        self.joints[rows] = q
 
-    def _local(self, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+    def _local(self, wanted: Array, q: Array) -> tuple[Array, Array, Array]:
         """Return the largest scaled errors (K,), corrections and unit null vectors (K, n)."""
-        q = self.joints[rows]
-        wanted, compute = self._poses[rows], poses_and_jacobians if len(rows) <= FEW else linearisation
+        compute = poses_and_jacobians if len(q) <= FEW else linearisation
         poses, slopes = compute(self._robot, q)
         turned = wanted[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)
-        errors = np.empty((len(rows), 6))
+        errors = np.empty((len(q), 6))
         errors[:, :3] = (wanted[:, :3, 3] - poses[:, :3, 3]) / self._length
-        low, high = _ABOUT_AXES  # the sine of a small turn, about its axis
-        errors[:, 3:] = 0.5 * (turned[:, low, high] - turned[:, high, low])
+        twice = turned - np.swapaxes(turned, 1, 2)  # the sine of a small turn, about its axis
+        errors[:, 3:] = 0.5 * twice.reshape(-1, 9)[:, _ABOUT_AXES]
         slopes[:, :3] /= self._length
         return np.abs(errors).max(axis=1), *_correction_and_null(errors, slopes)
 
-    def _limited(self, rows: NDArray[np.intp], q: Array, null: Array, step: Array) -> Array:
-        """Return steps that leave all joints inside their limits, as far as the null vector goes there."""
-        moves = np.abs(null) > _AT_LIMIT
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends = (self._bounds[:, rows] - q) / null
-        least = np.where(moves, np.minimum(ends[0], ends[1]), -np.inf).max(axis=1)
-        most = np.where(moves, np.maximum(ends[0], ends[1]), np.inf).min(axis=1)
-        limited = _short(np.minimum(np.maximum(step, least), most))
-        return np.where(least <= most, limited, 0.0)
+
+def _limited(bounds: Array, q: Array, null: Array, step: Array) -> Array:
+    """Return steps that leave all joints inside limits (K, 2, n), as far as the null vector goes there."""
+    ends = np.empty(bounds.shape)
+    ends[:, 0], ends[:, 1] = -np.inf, np.inf
+    moves = np.abs(null) > _AT_LIMIT
+    np.divide(bounds - q[:, None], null[:, None], out=ends, where=moves[:, None])
+    least, most = ends.min(axis=1).max(axis=1), ends.max(axis=1).min(axis=1)
+    limited = _short(np.minimum(np.maximum(step, least), most))
+    return np.where(least <= most, limited, 0.0)
 
 
 def _correction_and_null(errors: Array, slopes: Array) -> tuple[Array, Array]:
-    """Return the shortest corrections (K, n) of errors (K, m), and unit null vectors (K, n) of the slopes.
+    """Return the shortest corrections (K, 7) of errors (K, 6), and unit null vectors (K, 7) of the slopes.
 
     Both follow from one solution: the unit matrix without its part in the rows of the slopes is the null
     vector times itself, and its row with the largest diagonal entry is taken, so that nothing cancels.
     """
-    count, joints = len(slopes), slopes.shape[2]
     transposed = np.swapaxes(slopes, 1, 2)
-    system = slopes @ transposed + _DAMPING * np.eye(slopes.shape[1])
+    system = slopes @ transposed + _DAMPING
     solved = transposed @ np.linalg.solve(system, np.concatenate([slopes, errors[..., None]], axis=2))
-    left = np.eye(joints) - solved[..., :joints]
+    left = _UNIT - solved[..., :-1]
     sizes = np.diagonal(left, axis1=1, axis2=2)
-    each, longest = np.arange(count), sizes.argmax(axis=1)
-    return solved[..., joints], left[each, longest] / np.sqrt(sizes[each, longest])[:, None]
+    each, longest = np.arange(len(slopes)), sizes.argmax(axis=1)
+    return solved[..., -1], left[each, longest] / np.sqrt(sizes[each, longest])[:, None]
 
 
 def _short(step: Array) -> Array:
@@ -262,6 +268,5 @@ def _short(step: Array) -> Array:
 
 def _secant(curvature: Array, change: Array, step: Array) -> Array:
     """Return the curvatures by which the last steps changed the gap; the old ones where that says nothing."""
-    moved = np.abs(step) > _LAST
-    measured = -change / np.where(moved, step, 1.0)
-    return np.where(moved & (measured > _LEAST_CURVATURE), measured, curvature)
+    measured = np.divide(-change, step, out=np.zeros(len(step)), where=np.abs(step) > _LAST)
+    return np.where(measured > _LEAST_CURVATURE, measured, curvature)

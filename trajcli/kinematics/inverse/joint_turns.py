@@ -5,6 +5,8 @@ A value counts as inside while it is within `limit * (1 + 1e-9) + 1e-12`, as eve
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from trajcli.curves.piecewise import Array
@@ -27,9 +29,12 @@ def beyond(joints: Array, bounds: Array) -> Array:
     return np.where(joints > wide[:, 1], over, np.where(joints < wide[:, 0], under, 0.0))
 
 
+@lru_cache(maxsize=16)
 def revolute(robot: Robot) -> Flags:
-    """Return which joints turn, shape (n,)."""
-    return np.array([kind == "revolute" for kind in robot.joint_types])
+    """Return which joints turn, shape (n,), read-only."""
+    turning = np.array([kind == "revolute" for kind in robot.joint_types])
+    turning.flags.writeable = False
+    return turning
 
 
 def choose_turns(robot: Robot, joints: Array, near: Array | None, within: float = np.inf) -> None:
@@ -46,17 +51,18 @@ def choose_turns(robot: Robot, joints: Array, near: Array | None, within: float 
     """
     wide, turning = widened(robot.limits.position)[..., None, None], revolute(robot)
     if near is None and within <= np.pi:
-        turning &= (wide[:, 0, 0, 0] > -within) | (within > wide[:, 1, 0, 0])
+        turning = turning & ((wide[:, 0, 0, 0] > -within) | (within > wide[:, 1, 0, 0]))
     some = np.flatnonzero(turning)
     for part in [some] if joints[0].size <= _FEW else [slice(i, i + 1) for i in some]:
         values, low, high = joints[part], wide[part, 0], wide[part, 1]
         aim = np.zeros((len(values), 1, 1)) if near is None else near[part][:, None]
         outside = values < np.maximum(low, aim - np.pi)
         outside |= values > np.minimum(high, aim + np.pi)
-        if outside.any():
-            rows, _, poses = np.nonzero(outside)
-            aims = aim[rows, 0, poses if near is not None else 0]
-            values[outside] = _wrapped(values[outside], aims, low[rows, 0, 0], high[rows, 0, 0])
+        index = np.flatnonzero(outside)
+        if len(index):
+            rows, poses = index // values[0].size, index % values.shape[-1] if near is not None else 0
+            moved = _wrapped(values.take(index), aim[rows, 0, poses], low[rows, 0, 0], high[rows, 0, 0])
+            values.put(index, moved)
             joints[part] = values
 
 

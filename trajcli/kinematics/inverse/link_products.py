@@ -94,7 +94,9 @@ def poses_and_jacobians(robot: Robot, q: Array) -> tuple[Array, Array]:
     """
     known, values = _constants(robot), q.T
     angles = (known.angle + known.turning * values)[..., None, None]
-    local = np.cos(angles) * known.along + np.sin(angles) * known.across + known.fixed
+    local = np.cos(angles) * known.along
+    local += np.sin(angles) * known.across
+    local += known.fixed
     if known.slides:
         slides = np.where(known.sliding[:, None], values, 0.0)
         local += slides[..., None, None] * known.slid
@@ -103,10 +105,11 @@ def poses_and_jacobians(robot: Robot, q: Array) -> tuple[Array, Array]:
     for before, link, behind in zip(frames, local, frames[1:], strict=False):
         np.matmul(before, link, out=behind)
     up, origin = frames[..., :3, 2:].T  # each (3, K, n + 1)
-    axes, arms = up[..., :-1] * known.sign, origin[..., -1:] - origin[..., :-1]
     jacobians = np.empty((len(q), 6, len(values)))
-    moments = axes[[1, 2, 0]] * arms[[2, 0, 1]] - axes[[2, 0, 1]] * arms[[1, 2, 0]]
-    jacobians[:, :3], jacobians[:, 3:] = moments.swapaxes(0, 1), axes.swapaxes(0, 1)
+    by_row = jacobians.swapaxes(0, 1)
+    (x, y, z), (a, b, c) = up[..., :-1] * known.sign, origin[..., -1:] - origin[..., :-1]
+    for out, entry in zip(by_row, (y * c - z * b, z * a - x * c, x * b - y * a, x, y, z), strict=True):
+        out[...] = entry
     if known.slides:
         jacobians[:, :3] = np.where(known.sliding, jacobians[:, 3:], jacobians[:, :3])
         jacobians[:, 3:] = np.where(known.sliding, 0.0, jacobians[:, 3:])

@@ -67,7 +67,8 @@ class IkTarget:
 
     def rows(self, index: ArrayLike | slice) -> IkTarget:
         """Return the targets of some rows of a flat batch."""
-        return replace(self, poses=self.poses[index], aims=self.aims[index])  # type: ignore[index]
+        poses, aims = self.poses[index], self.aims[index]  # type: ignore[index]
+        return IkTarget(poses, self.position, self.orientation, self.tool_axis, aims)
 
     def flat(self) -> IkTarget:
         """Return the same targets with one batch dimension."""
