@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.time_optimal.constraints import ConstraintRows, PathConstraint
 from trajcli.frozen import frozen
 
@@ -100,8 +100,8 @@ def interval_rows(grid: Array, constraints: Sequence[PathConstraint], stops: Arr
         constraints: At least one.
         stops: Grid points where x must be zero.
     """
-    near_rows = [constraint.rows(grid[:-1], "right") for constraint in constraints]
-    far_rows = [constraint.rows(grid[1:], "left") for constraint in constraints]
+    at_ends = [_at_ends(constraint, grid) for constraint in constraints]
+    near_rows, far_rows = zip(*at_ends, strict=True)
     near, far, D = _joined(near_rows), _joined(far_rows), np.diff(grid)
     cap, turns = (np.append(each, np.inf) for each in (_cap(near_rows), _turning_cap(near, D)))
     cap[1:] = np.minimum(cap[1:], _cap(far_rows))
@@ -122,6 +122,34 @@ def interval_rows(grid: Array, constraints: Sequence[PathConstraint], stops: Arr
     R[size_R <= _FLAT * size_P] = 0.0
     eased = np.ones((len(near_rows), grid.size))
     return IntervalRows(grid, P, R, C, C, eased, cap, turning, owners[sources], sources, near, far)
+
+
+def _at_ends(constraint: PathConstraint, grid: Array) -> tuple[ConstraintRows, ConstraintRows]:
+    """Return the rows at the near and at the far ends of the intervals of a grid.
+
+    Where a constraint is about a path of the joints, both sides of a point say the same but at its breaks.
+    """
+    path = getattr(constraint, "path", None)
+    if not isinstance(path, PiecewisePolynomial):
+        return constraint.rows(grid[:-1], "right"), constraint.rows(grid[1:], "left")
+    right, steps = constraint.rows(grid, "right"), np.flatnonzero(np.isin(grid[1:-1], path.breaks))
+    near, far = _some(right, slice(-1)), _some(right, slice(1, None))
+    if not steps.size:
+        return near, far
+    left = constraint.rows(grid[1 + steps], "left")
+    changed = {}
+    for name in ("a", "b", "c", "cap", "work"):
+        values, there = getattr(far, name), getattr(left, name)
+        if values is not None and not np.array_equal(values[steps], there):
+            changed[name] = values.copy(order="K")
+            changed[name][steps] = there
+    return near, replace(far, **changed)
+
+
+def _some(rows: ConstraintRows, points: slice) -> ConstraintRows:
+    """Return the rows at some of the points."""
+    work = None if rows.work is None else rows.work[points]
+    return ConstraintRows(rows.a[points], rows.b[points], rows.c[points], rows.cap[points], work)
 
 
 def _works(
