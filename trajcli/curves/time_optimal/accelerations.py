@@ -28,7 +28,7 @@ _AT_MOST, _SWITCHES = 0, 2  # kinds of intervals beside those where an upper (1)
 
 
 @frozen
-class _Bound:
+class BindingRows:
     """What binds in each interval, and sdd at both ends by it, or NaN; each of shape (N,)."""
 
     kind: NDArray[np.intp]
@@ -37,7 +37,7 @@ class _Bound:
 
 
 def end_accelerations(
-    rows: IntervalRows, x: Array, mvc: Array, even: NDArray[np.bool_]
+    rows: IntervalRows, x: Array, mvc: Array, bound: BindingRows, even: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """Return sdd at the near and at the far ends of the intervals, each of shape (N,).
 
@@ -45,11 +45,11 @@ def end_accelerations(
         rows: Of N intervals.
         x: sd^2 at the grid points, the solution for them, shape (N + 1,).
         mvc: Largest sd^2 there, shape (N + 1,).
+        bound: What `binding_rows` returns for these rows and this solution.
         even: In which intervals sdd shall be constant, shape (N,).
     """
     lengths = np.diff(rows.grid)
     mean = np.diff(x) / (2.0 * lengths)
-    bound = _bounds(rows, x)
     full = x >= mvc * (1.0 - _FULL)
     kind = np.where((bound.kind == 0) & ~(full[1:] & full[:-1]), _SWITCHES, bound.kind)
     kind[even] = _SWITCHES
@@ -100,7 +100,7 @@ def _guessed(mean: Array, lengths: Array, goes_on: NDArray[np.bool_]) -> tuple[A
 
 
 def _believed(
-    bound: _Bound, mean: Array, goes_on: NDArray[np.bool_], near: Array, far: Array
+    bound: BindingRows, mean: Array, goes_on: NDArray[np.bool_], near: Array, far: Array
 ) -> tuple[Array, Array]:
     """Return sdd at both ends by the rows that bind, where that is credible, else as guessed.
 
@@ -126,7 +126,7 @@ def _kinks(mean: Array, grid: Array) -> NDArray[np.bool_]:
     return np.asarray((slope > _KINK * around) & (change > _STEP * np.abs(mean).max()))
 
 
-def _bounds(rows: IntervalRows, x: Array) -> _Bound:
+def binding_rows(rows: IntervalRows, x: Array) -> BindingRows:
     """Return which rows bind in the intervals, and what they say."""
     count = x.size - 1
     kind, near, far = np.zeros(count, dtype=np.intp), np.empty(count), np.empty(count)
@@ -149,4 +149,4 @@ def _bounds(rows: IntervalRows, x: Array) -> _Bound:
             near[block] = np.where(says & (np.abs(a0) > small), (c0 * e0 - b0 * begin) / a0, np.nan)
             far[block] = np.where(says & (np.abs(a1) > small), (c1 * e1 - b1 * end) / a1, np.nan)
         kind[block] = np.where(binds, np.sign(a0 + a1), 0)
-    return _Bound(kind, near, far)
+    return BindingRows(kind, near, far)

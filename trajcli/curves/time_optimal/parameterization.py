@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, distinct
-from trajcli.curves.time_optimal.accelerations import end_accelerations
+from trajcli.curves.time_optimal.accelerations import binding_rows, end_accelerations
 from trajcli.curves.time_optimal.collocation import IntervalRows, interval_rows
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint, corners, is_at_rest
 from trajcli.curves.time_optimal.passes import (
@@ -299,8 +299,10 @@ def _judged(
     before: GridSolution | None,
 ) -> GridSolution:
     """Return the solution with its law and the excess of that; where it is wild, sdd is constant."""
+    bound = binding_rows(rows, speeds.x)
     while True:
-        pieces = law_pieces(rows.grid, speeds.x, *end_accelerations(rows, speeds.x, speeds.mvc, even))
+        ends = end_accelerations(rows, speeds.x, speeds.mvc, bound, even)
+        pieces = law_pieces(rows.grid, speeds.x, *ends)
         before = GridSolution(problem, rows, speeds, pieces, _excess(problem, pieces, before), even)
         wild = (before.excess.max(axis=(0, 1)) > _WILD) & ~even
         if not wild.any():
