@@ -6,6 +6,7 @@ A joint path q(s), a time law s(t) and a trajectory q(t) are this type in three 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import comb, isfinite, perm
 from typing import Literal
 
@@ -188,8 +189,14 @@ def derivative_coefficients(coefficients: Array, order: int) -> Array:
         return coefficients
     if order > degree:
         return np.zeros((1, *coefficients.shape[1:]))
-    factors = np.array([perm(power, order) for power in range(degree, order - 1, -1)], dtype=np.float64)
+    factors = _falling_factorials(degree, order)
     return coefficients[: degree + 1 - order] * factors.reshape(-1, *([1] * (coefficients.ndim - 1)))
+
+
+@lru_cache(maxsize=64)
+def _falling_factorials(degree: int, order: int) -> Array:
+    """Return what the powers of a polynomial are multiplied by where it is derived, highest power first."""
+    return read_only([perm(power, order) for power in range(degree, order - 1, -1)])
 
 
 def horner(coefficients: Array, x: Array) -> Array:

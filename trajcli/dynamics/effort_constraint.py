@@ -58,6 +58,8 @@ class _PathDynamics:
         near, apart = np.searchsorted(self._s, s), _SAME * np.abs(states).max(axis=0, initial=0.0)
         values, new = np.empty_like(states), np.arange(s.size)
         for beside in (0, 1, -1) if self._s.size else ():  # of a break there are two states
+            if not new.size:
+                break
             index = np.clip(near[new] + beside, 0, self._s.size - 1)
             same = (np.abs(self._states[index] - states[new]) <= apart).all(axis=1)
             values[new[same]], new = self._values[index[same]], new[~same]
