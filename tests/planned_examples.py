@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.planning.plan import Carried, Plan, plan_job
@@ -18,6 +19,13 @@ _PLANS: dict[tuple[str, ...], Plan] = {}
 def planned_example(name: str) -> Plan:
     """Return the plan of `examples/NAME.yaml`."""
     return planned_once(load_job(EXAMPLES / f"{name}.yaml"))
+
+
+@cache
+def flown_cell() -> Plan:
+    """Return the plan of `examples/flying_cell.yaml` without what its gripper does: three moves, two zones."""
+    job = yaml.safe_load((EXAMPLES / "flying_cell.yaml").read_text(encoding="utf-8"))
+    return _planned_text(yaml.safe_dump({**job, "moves": job["moves"][::4]}))
 
 
 @cache

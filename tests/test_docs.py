@@ -40,7 +40,7 @@ def test_generated_pages_are_current(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", few([path for path in DOCUMENTS if shows_commands(path)], 5), ids=lambda path: path.stem
+    "path", few([path for path in DOCUMENTS if shows_commands(path)], 4), ids=lambda path: path.stem
 )
 def test_commands_print_and_draw_what_is_shown(path: Path) -> None:
     made = outcome(text_of(path))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 
@@ -17,6 +18,7 @@ def quoted(text: str) -> set[str]:
     return set(re.findall(r"`([^`\n]+)`", text))
 
 
+@cache
 def classes() -> set[str]:
     return {
         node.name if isinstance(node, ast.ClassDef) else ast.unparse(node.targets[0])

@@ -19,9 +19,7 @@ from trajcli.planners.planner import Planner
 from trajcli.planning.plan import plan_job
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
-PLANNED = few(
-    [path for path in EXAMPLES if "zone: " not in path.read_text()], 12
-)  # corners take seconds each
+PLANNED = few([path for path in EXAMPLES if "zone: " not in path.read_text()], 8)  # corners take seconds each
 
 
 def fields_of(move: Planner) -> tuple[Any, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from line_of_ur5e import JOB, plan
 from recorded_rows import part
+from tiers import few
 
 import trajcli
 from trajcli.api.plans import PlannedJob
@@ -286,7 +287,7 @@ def to_and_fro(way: float, turn: float, passes: int) -> PlannedJob:
     return trajcli.plan({**SQUARE, "limits": limits, "moves": [{**SQUARE["moves"][0], "segments": segments}]})
 
 
-@pytest.mark.parametrize("rate", [8, 20, 125])
+@pytest.mark.parametrize("rate", few([8, 20, 125], 2))
 def test_a_tool_that_goes_to_and_fro_is_known_by_how_it_is_turned(rate: int) -> None:
     """It passes each place eight times, another way round: rows right beside a corner are on one side of it alone.
 

@@ -164,7 +164,7 @@ JOB_ON_PATH = {"version": 1, "robot": "ur5e", "limits": {"acceleration": 20}, "s
 
 @pytest.mark.parametrize("key", THIRD)
 @pytest.mark.parametrize("shape", ["jerk_limited", "quintic", "time_optimal"])
-@pytest.mark.parametrize("planner", few(["path", "line", "arc"], 2))
+@pytest.mark.parametrize("planner", few(["path", "line", "arc"], 1))
 def test_on_a_path_the_whole_vector_counts(planner: str, shape: str, key: str) -> None:
     """On a rounded corner the tool turns at speed: its jerk was 2.5 times that along the path."""
     tcp = {

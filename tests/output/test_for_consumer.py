@@ -56,7 +56,7 @@ def made_for(name: str, profile: str) -> ForConsumer:
             ("scara_pick", "ros-jtc", 1.0),
             ("trapezoid", "ros-jtc", 1.0),
         ],
-        4,
+        3,
     ),
 )
 def test_rows_keep_all_limits_as_they_are_joined(name: str, profile: str, longest: float) -> None:

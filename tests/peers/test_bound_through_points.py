@@ -46,7 +46,7 @@ def test_joints_that_are_slow_in_turn_bound_it_together() -> None:
     assert reference_of(planned).duration == pytest.approx(2.0, rel=1e-9)
 
 
-@pytest.mark.parametrize("planner", few(["spline", "waypoints", "time_optimal"], 2))
+@pytest.mark.parametrize("planner", few(["spline", "waypoints", "time_optimal"], 1))
 def test_no_motion_through_points_is_below_it(planner: str) -> None:
     """Motions of three planners, found by search, optimal control and splines, are no faster."""
     tried = 0

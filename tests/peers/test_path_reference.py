@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.read import job_from_text, load_job
@@ -69,7 +70,7 @@ def test_what_a_curve_uses_is_the_extreme_of_its_derivatives():
     assert use([-np.inf, np.inf], [-np.inf, np.inf]) is None
 
 
-@pytest.mark.parametrize("name", ["time_optimal", "recorded", "dispense"])
+@pytest.mark.parametrize("name", few(["time_optimal", "recorded", "dispense"], 2))
 def test_moves_of_the_examples_are_compared_for_all_t(name):
     plan = plan_job(load_job(EXAMPLES / f"{name}.yaml"))
     compared = [move for move in report_of(plan, reference=True).moves if move.path_reference is not None]

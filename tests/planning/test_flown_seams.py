@@ -88,6 +88,7 @@ def test_columns_of_the_path_say_where_the_tool_is_on_it_and_stand_in_a_zone(lin
     assert np.abs(changes - sdd[:-1][on_path[1:] & on_path[:-1]]).max() < 0.1 * np.abs(sdd).max()
 
 
+@pytest.mark.full
 def test_the_report_of_the_tool_is_that_of_its_path_between_zones(lines):
     """Its peaks beside zones are those of the tool by the textbook; the whole path has the length that it has."""
     plan = lines

@@ -87,6 +87,7 @@ def test_waypoints_are_flown_by_at_their_ends_and_pass_their_points(name):
         assert off.max() <= 0.02 * (1 + 1e-6)
 
 
+@pytest.mark.full
 def test_waypoints_along_a_polyline_say_what_can_be_flown_by_in_their_place():
     """What they advise is followed."""
     points = {"through": [{"joints": [0.8, 1.5]}], "to": {"joints": [1.0, 1.6]}}

@@ -141,8 +141,10 @@ def test_laws_of_the_tool(law: Job, jerk: float | None) -> None:
 @pytest.mark.parametrize(
     ("move", "limit", "named"),
     [
-        ({"planner": "trapezoid", "to": BENT}, "jerk", 3),
-        ({"planner": "cubic", "duration": 1.5, "to": BENT}, "angular_jerk", 3),
+        pytest.param({"planner": "trapezoid", "to": BENT}, "jerk", 3, marks=pytest.mark.full),
+        pytest.param(
+            {"planner": "cubic", "duration": 1.5, "to": BENT}, "angular_jerk", 3, marks=pytest.mark.full
+        ),
         ({"planner": "line", "to": AWAY, "law": {"shape": "trapezoid"}}, "jerk", 3),
         ({"planner": "spline", "rule": "clamped", "through": [BENT], "to": ARM, "duration": 3}, "jerk", 2),
     ],

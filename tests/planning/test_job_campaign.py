@@ -32,6 +32,7 @@ def test_a_verified_job_keeps_its_limits(number: int) -> None:
     campaign(few(range(number, 2 * len(PLANNERS), len(PLANNERS)), 1))
 
 
+@pytest.mark.full
 def test_the_whole_jerk_of_the_tool_is_kept_where_that_along_the_path_is_at_its_limit() -> None:
     """A time-optimal path on a Panda: verified, it was 2.3e-4 above its limit where the path is bent."""
     figures = campaign([2293])
@@ -45,6 +46,7 @@ def test_ten_thousand_jobs(block: int, tally: Tally) -> None:
     tally(campaign(range(1000 + BLOCK * block, 1000 + BLOCK * (block + 1))))
 
 
+@pytest.mark.full
 def test_limits_bind_in_random_jobs() -> None:
     """Else the campaign would see no motion that passes one."""
     shares = [judged(number)[2] for number in range(0, 4 * len(PLANNERS), 7)]

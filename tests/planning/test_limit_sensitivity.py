@@ -306,6 +306,7 @@ def test_explain_says_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
     assert json.loads(capfd.readouterr().out)["savings"] is None
 
 
+@pytest.mark.full
 def test_a_search_from_the_motion_that_is_known_finds_what_one_from_nothing_finds() -> None:
     """What a job with the higher limits lasts, searched from all of its own starting points."""
     points = [{"joints": at} for at in ([0.5, 0.2], [0.8, 0.9])]

@@ -246,7 +246,7 @@ def refused(*moves: dict[str, Any], **fields: Any) -> str:
 
 @pytest.mark.parametrize(
     ("begin", "end", "rail"),
-    [((2.5, 0.2, 0.9), 4.5, 0.5), ((2.5, 0.2, 0.9), 4.5, 0.0), ((1.8, 0.0, 1.6), -1.5, 1.1)],
+    few([((2.5, 0.2, 0.9), 4.5, 0.5), ((2.5, 0.2, 0.9), 4.5, 0.0), ((1.8, 0.0, 1.6), -1.5, 1.1)], 1),
 )
 def test_a_pinned_rail_that_leaves_the_arm_behind_is_named(begin, end: float, rail: float) -> None:
     """The wrist is as far from the shoulder as both links are long: in a plane through the first axis."""

@@ -61,7 +61,7 @@ def refused(moves: str) -> Problem:
                 "far",
             ),
         ],
-        3,
+        2,
     ),
 )
 def test_a_named_point_is_named_at_its_line(move: str, line: int, name: str) -> None:

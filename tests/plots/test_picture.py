@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planned_examples import flown_cell
 
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
@@ -361,9 +362,9 @@ def test_two_files_must_agree_about_a_joint_and_something_must_be_there() -> Non
         picture_of(None, [a], quantities=["phase"])
 
 
-def test_zones_are_circles_about_their_corners(example: Example) -> None:
+def test_zones_are_circles_about_their_corners() -> None:
     """The corners are the targets of the job; outside a ball the tool is on the programmed path."""
-    plan = example("flying_cell")
+    plan = flown_cell()
     views = picture_of(plan, quantities=["path"]).views
     assert views is not None
     flown = [zone for zone in plan.flyby.zones if zone.of == "position"] if plan.flyby else []

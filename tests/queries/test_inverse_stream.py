@@ -37,7 +37,7 @@ def followed(arm, poses):
             ("ur5e", True, 1),
             ("ur10e", True, 6),
         ],
-        3,
+        2,
     ),
 )
 def test_each_row_is_the_nearest_answer(monkeypatch, robot, smooth, rounds):

@@ -116,7 +116,7 @@ def test_the_table_of_a_ur5_is_the_published_one() -> None:
     assert np.array_equal(model("ur5").robot.tool, np.eye(4))
 
 
-@pytest.mark.parametrize("name", catalogue_names())
+@pytest.mark.parametrize("name", few(catalogue_names(), 20))
 @pytest.mark.parametrize("exact", [False, True])
 def test_out_and_in_is_the_same_robot(name: str, exact: bool) -> None:
     robot = load_robot(name)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from independent_reader import ReadBack
 from scipy.spatial.transform import Rotation
+from tiers import few
 
 from trajcli.catalogue.entries import catalogue_names
 from trajcli.cli.app import app
@@ -51,7 +52,7 @@ def arm(name: str) -> Robot:
     return random_arm(int(seed), kind) if seed else load_robot(name)
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", few(ARMS, 20))
 def test_forward_kinematics_is_that_of_the_table(name: str) -> None:
     robot = arm(name)
     read = ReadBack(urdf_of(robot))
@@ -61,7 +62,7 @@ def test_forward_kinematics_is_that_of_the_table(name: str) -> None:
         assert np.abs(read.forward(by_name) - pose).max() <= 1e-12 * max(1, np.abs(pose).max())
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", few(ARMS, 20))
 def test_transforms_are_those_between_the_links_of_the_text(name: str) -> None:
     robot = arm(name)
     read, chain = ReadBack(urdf_of(robot)), chain_of(robot)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
+from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.splines.time_allocation import fastest_durations
@@ -83,7 +84,7 @@ def test_directions_have_their_own_bounds():
     np.testing.assert_allclose(found, [1, 4], rtol=0.02)
 
 
-@pytest.mark.parametrize(("seed", "count", "joints"), [(1, 3, 1), (2, 5, 1), (3, 5, 2), (4, 8, 2)])
+@pytest.mark.parametrize(("seed", "count", "joints"), few([(1, 3, 1), (2, 5, 1), (3, 5, 2), (4, 8, 2)], 3))
 def test_no_slower_than_a_search_of_scipy(seed, count, joints):
     q, family = points(seed, count, joints), smooth(points(seed, count, joints))
     limits, guess = bounds(1, 3, joints=joints), np.full(count - 1, 1.0)

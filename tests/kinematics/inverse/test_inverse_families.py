@@ -32,7 +32,7 @@ def check_random_poses(robot, rng, count):
     return poses, found
 
 
-@pytest.mark.parametrize("name", few(NAMES, 20))
+@pytest.mark.parametrize("name", few(NAMES, 10))
 @pytest.mark.parametrize("convention", ["standard", "modified"])
 def test_closed_forms_close_and_contain_the_generating_joints(name, convention):
     rng = generator(name)

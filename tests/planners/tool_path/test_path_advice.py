@@ -112,6 +112,7 @@ def test_of_a_doubled_point_the_least_radius_counts() -> None:
     assert corner.kind == "stop"
 
 
+@pytest.mark.full
 def test_a_jerk_limited_law_about_a_rounded_corner_names_the_faster_one() -> None:
     law = ("law: {shape: time_optimal}", "law: {shape: jerk_limited, jerk: 20000}")
     plan = planned(TURN, law)

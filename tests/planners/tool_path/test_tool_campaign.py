@@ -128,7 +128,7 @@ def refused(text: str, tracker: Tracker) -> str:
     return reason
 
 
-@pytest.mark.parametrize("number", few(FIXED, 8))
+@pytest.mark.parametrize("number", few(FIXED, 4))
 def test_a_task_is_planned_or_refused_for_a_reason(number):
     judge(number)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from independent_motion import poses, series_of
+from tiers import few
 from tool_jobs import DOWN, plan, refusal
 
 from trajcli.cli.tool_text import tool_lines
@@ -258,7 +259,7 @@ def test_a_weave_is_not_flown_by():
     assert not made.flyby.zones
 
 
-@pytest.mark.parametrize("shape", ["sine", "triangle", "trapezoid"])
+@pytest.mark.parametrize("shape", few(["sine", "triangle", "trapezoid"], 1))
 def test_an_explanation_says_shape_amplitude_and_cycles(shape):
     """In the units of the job; without a weave it says nothing of one."""
     corner = {"line": {"xyz": [0.4, -0.07, 0.3]}, "radius": 0.0}

@@ -95,7 +95,7 @@ def test_rules_with_jumps_of_curvature_are_refused(rule):
     fastest(rule=rule, limits={"velocity": 2.0, "acceleration": 8.0})
 
 
-@pytest.mark.parametrize("fields", [{}, {"rule": "natural"}, {"rule": "quintic"}])
+@pytest.mark.parametrize("fields", few([{}, {"rule": "natural"}, {"rule": "quintic"}], 2))
 def test_ends_in_motion_are_kept_with_their_accelerations(fields):
     velocity, acceleration = [0.3, 0.1], [0.5, -0.4]
     if fields.get("rule") == "quintic":

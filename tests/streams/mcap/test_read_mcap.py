@@ -176,6 +176,7 @@ def test_a_truncated_file_is_one_error(share: float, pick_log: Path, tmp_path: P
     assert "truncated" in text if share else "no MCAP file" in text
 
 
+@pytest.mark.full
 def test_every_end_is_an_error(tmp_path: Path) -> None:
     _, messages = states(3)
     data = bag(tmp_path / "a.mcap", {"/x": (STATE, messages)}).read_bytes()

@@ -214,20 +214,23 @@ def halves_of(rows: RowSource, columns: Sequence[Column], still: NDArray[np.bool
 
 def _grids(plan: Plan, stamps: _Stamps) -> Iterator[Grid]:
     """Yield the grids that have as many rows as the file, and its extent; their times start at its first."""
-    output, duration = plan.loaded.job.output, plan.trajectory.duration
-    asked: Grid | None = None
-    if output.times is not None:
-        asked = ListedGrid(duration, np.array(output.times), output.start_time)
-    found: list[Grid] = [] if asked is None else [asked]
-    found += [UniformGrid(duration, rate, stamps.first) for rate in _rates(plan, stamps)]
-    for stated in (2, 3) if has_knots(plan.trajectory) else ():
-        knots = knots_of(plan.trajectory, stated)
-        found.append(knot_grid(plan.trajectory, knots, None, stamps.first))
-        if stamps.count > knots.times.size:
-            found.append(knot_grid(plan.trajectory, knots, output.rate, stamps.first))
-    for grid in found:
+    for grid in _possible_grids(plan, stamps):
         if grid.count == stamps.count:
             yield grid
+
+
+def _possible_grids(plan: Plan, stamps: _Stamps) -> Iterator[Grid]:
+    """Yield the grids of a plan on which rows may stand, one after the other: knots cost a search."""
+    output, trajectory = plan.loaded.job.output, plan.trajectory
+    if output.times is not None:
+        yield ListedGrid(trajectory.duration, np.array(output.times), output.start_time)
+    for rate in _rates(plan, stamps):
+        yield UniformGrid(trajectory.duration, rate, stamps.first)
+    for stated in (2, 3) if has_knots(trajectory) else ():
+        knots = knots_of(trajectory, stated)
+        yield knot_grid(trajectory, knots, None, stamps.first)
+        if stamps.count > knots.times.size:
+            yield knot_grid(trajectory, knots, output.rate, stamps.first)
 
 
 def _rates(plan: Plan, stamps: _Stamps) -> Iterator[float]:
@@ -331,7 +334,7 @@ class _Known:
             wrong: Those that differ at these times, rising indices, shape (k,).
         """
         within = self.stamps.rounding + _ULPS * float(np.spacing(abs(self.stamps.last[1]) + local[-1]))
-        near = np.stack([self._at(local[wrong] + shift, wrong) for shift in (-within, 0.0, within)])
+        near = np.stack([self._at(local[wrong] + shift) for shift in (-within, 0.0, within)])
         values = block[wrong]
         self._turn_signs(near, values)
         between = np.abs(np.diff(near, axis=0)).min(axis=0)  # the larger one of both is a step
@@ -347,14 +350,13 @@ class _Known:
         against = (near[..., parts] * values[:, parts]).sum(axis=-1) < 0
         near[..., parts] = np.where(against[..., None], -near[..., parts], near[..., parts])
 
-    def _at(self, local: Array, numbers: NDArray[np.intp]) -> Array:
+    def _at(self, local: Array) -> Array:
         """Return the rows of the motion at some times, SI, shape (k, m)."""
         trajectory = self.plan.trajectory
         times = np.clip(local, 0.0, trajectory.duration)
-        single = [ListedGrid(trajectory.duration, times[k : k + 1]) for k in range(numbers.size)]
-        grids = (
-            single if (np.diff(times) <= 2 * _NANOSECOND).any() else [ListedGrid(trajectory.duration, times)]
-        )
+        apart = (np.diff(times) > 2 * _NANOSECOND).all()
+        together = [times] if apart else times[:, None]
+        grids = (ListedGrid(trajectory.duration, each) for each in together)
         robot = self.plan.loaded.robot_of_rows
         parts = [part for grid in grids for part in sample(trajectory, grid, self.rows.groups, robot=robot)]
         return np.concatenate(parts)[:, self.rows.index]
