@@ -78,7 +78,7 @@ def test_a_move_is_stretched_to_the_limit(key: str, move: dict[str, Any]) -> Non
     Report.model_validate_json(report_of(plan).model_dump_json())
 
 
-@pytest.mark.parametrize("key", THIRD)
+@pytest.mark.parametrize("key", few(THIRD, 1))
 def test_between_moving_states_the_search_sees_it(key: str) -> None:
     move = {"to": {"joints": [0.1 + TURN], "velocity": [0.3]}, "when_over_limit": "slow"}
     plan = plan_job(loaded(link({key: 4.0}, move)))
