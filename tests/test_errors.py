@@ -6,21 +6,26 @@ The oracle of a refusal is the same refusal of the same job with harmless names,
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import pytest
 from tiers import few
 
 from trajcli.cli.frames import problem_as_json, render_problem
-from trajcli.errors import Amount, Problem, TrajcliError, said
+from trajcli.errors import Amount, Place, Problem, TrajcliError, said
 from trajcli.job.dump import robot_as_mapping
 from trajcli.job.read import job_from_text
 from trajcli.job.robot import load_robot
 from trajcli.output.report import report_of, verification_error
 from trajcli.planning.plan import plan_job
 
+ROOT = Path(__file__).parents[1]
 AWKWARD = [
     "{limit}",
     "{value}",
@@ -190,3 +195,35 @@ def test_contexts_add_up_and_are_text() -> None:
     assert literal.text() == "{limit}: the point {context0} is missing"
     template = Problem("{joint} has {value}", amounts={"joint": "{value}", "value": Amount(2.0)})
     assert template.within("{value}").within("{joint}").text() == "{joint}: {value}: {value} has 2"
+
+
+def kinds_of_errors() -> list[type[TrajcliError]]:
+    """Return every class of errors that the package has."""
+    found = []
+    for file in sorted((ROOT / "trajcli").rglob("*.py")):
+        for name in re.findall(r"^class (\w+)\(\w*Error\):", file.read_text(encoding="utf-8"), re.MULTILINE):
+            kind = getattr(import_module(".".join(file.relative_to(ROOT).with_suffix("").parts)), name)
+            found += [kind] if issubclass(kind, TrajcliError) else []
+    return [TrajcliError, *found]
+
+
+MADE_FROM: dict[str, Callable[[type[Any]], Any]] = {
+    "StandstillError": lambda kind: kind(0.25),
+    "CornerError": lambda kind: kind(2, Problem("it turns back")),
+    "NoLawError": lambda kind: kind("too fast", {1: 0.5}),
+}
+
+
+@pytest.mark.parametrize("kind", kinds_of_errors(), ids=lambda kind: kind.__name__)
+def test_an_error_that_is_located_and_said_is_the_same_one(kind: type[TrajcliError]) -> None:
+    """Whatever its class is made from: what it knows stays, its place is added, its numbers get their units."""
+    made = MADE_FROM.get(kind.__name__, lambda kind: kind("one thing"))(kind)
+    before, place = made.__dict__.copy(), Place("job.yaml", 3, 5)
+    for other in (made.located(place=place), made.said_by(str), made.located(place=place).said_by(str)):
+        assert type(other) is kind
+        assert (other.exit_code, str(other)) == (made.exit_code, str(made))
+        assert other.args == other.problems
+        assert other.__dict__.keys() == before.keys()
+        assert all(other.__dict__[key] == before[key] for key in before.keys() - {"problems"})
+    assert [problem.place for problem in made.located(place=place).problems] == [place]
+    assert [problem.place for problem in made.problems] == [None]

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import field, replace
-from typing import Literal
+from typing import Literal, Self
 
 from trajcli.frozen import comparable
 
@@ -190,19 +190,26 @@ class TrajcliError(Exception):
     def __str__(self) -> str:
         return "\n".join(problem.text() for problem in self.problems)
 
-    def located(self, **fields: object) -> TrajcliError:
+    def located(self, **fields: object) -> Self:
         """Return the same error with `fields` (of `Problem`) filled in where they are still empty."""
         problems = []
         for problem in self.problems:
             empty = {name: value for name, value in fields.items() if getattr(problem, name) is None}
             problems.append(replace(problem, **empty))  # type: ignore[arg-type]
-        return type(self)(*problems)
+        return self._of(problems)
 
-    def said_by(self, say: Callable[[Amount], str]) -> TrajcliError:
+    def said_by(self, say: Callable[[Amount], str]) -> Self:
         """Return the same error with the amounts of its messages as `say` writes them."""
-        return type(self)(
-            *(replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems)
+        return self._of(
+            replace(p, message=p.text(say), hint=p.advice(say), amounts={}) for p in self.problems
         )
+
+    def _of(self, problems: Iterable[Problem]) -> Self:
+        """Return the same error of other problems, whatever its class is made from."""
+        made = type(self).__new__(type(self))
+        made.__dict__ |= self.__dict__ | {"problems": tuple(problems)}
+        made.args = made.problems
+        return made
 
 
 class VerificationError(TrajcliError):

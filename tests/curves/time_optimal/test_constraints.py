@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from topp_paths import SpeedCap, dense, over, polyline, random_bounds, spline, symmetric
@@ -10,6 +12,7 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal import parameterization
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal.passes import StandstillError
 from trajcli.curves.time_optimal.time_law import LawPieces, law_and_trajectory, law_pieces
 
 
@@ -119,3 +122,14 @@ def test_joints_whose_limits_come_as_a_further_constraint_are_as_fast(seed):
     assert min(found.tightened, both.tightened) > 0
     _, moved = law_and_trajectory(second, LawPieces(found.law.lengths, found.law.coefficients[:, :, 0]))
     assert max(over(moved, velocity[2:], acceleration[2:])) <= 1.0 + 1e-9
+
+
+def test_where_nothing_may_move_the_place_and_what_helps_are_named():
+    path, limits = polyline([[0.0], [1.0]]), (symmetric(9.0), symmetric(50.0))
+    blocked = SpeedCap(lambda s: np.where(np.abs(s - 0.5) < 0.2, 0.0, 1.0))
+    with pytest.raises(StandstillError) as caught:
+        time_optimal(path, *limits, further=[blocked])
+    (place,) = re.findall(r"^the limits let nothing move on from s = (\S+)$", str(caught.value))
+    assert float(place) == pytest.approx(0.3, abs=1 / 96)
+    (problem,) = caught.value.problems
+    assert problem.hint == "raise limits of effort"
