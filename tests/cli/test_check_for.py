@@ -226,6 +226,7 @@ def test_goals_for_the_trajectory_controller(
     assert severity == "warning" or code == 1
 
 
+@pytest.mark.full
 def test_what_a_plan_for_a_consumer_writes_is_checked_for_it(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

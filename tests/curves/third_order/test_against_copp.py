@@ -77,6 +77,7 @@ def compared(seed):
     return duration / at_stations
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", few([0, 7], 1))
 def test_a_part_of_the_published_rule(seed):
     compared(seed)
