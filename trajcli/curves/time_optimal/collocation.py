@@ -133,23 +133,15 @@ def _at_ends(constraint: PathConstraint, grid: Array) -> tuple[ConstraintRows, C
     if not isinstance(path, PiecewisePolynomial):
         return constraint.rows(grid[:-1], "right"), constraint.rows(grid[1:], "left")
     right, steps = constraint.rows(grid, "right"), np.flatnonzero(np.isin(grid[1:-1], path.breaks))
-    near, far = _some(right, slice(-1)), _some(right, slice(1, None))
-    if not steps.size:
-        return near, far
-    left = constraint.rows(grid[1 + steps], "left")
-    changed = {}
-    for name in ("a", "b", "c", "cap", "work"):
-        values, there = getattr(far, name), getattr(left, name)
-        if values is not None and not np.array_equal(values[steps], there):
-            changed[name] = values.copy(order="K")
-            changed[name][steps] = there
-    return near, replace(far, **changed)
-
-
-def _some(rows: ConstraintRows, points: slice) -> ConstraintRows:
-    """Return the rows at some of the points."""
-    work = None if rows.work is None else rows.work[points]
-    return ConstraintRows(rows.a[points], rows.b[points], rows.c[points], rows.cap[points], work)
+    left = constraint.rows(grid[1 + steps], "left") if steps.size else right
+    near, far = {}, {}
+    for name in ConstraintRows.__match_args__:
+        if (values := getattr(right, name)) is not None:
+            near[name], far[name], at_breaks = values[:-1], values[1:], getattr(left, name)
+            if steps.size and not np.array_equal(far[name][steps], at_breaks):
+                far[name] = far[name].copy(order="K")
+                far[name][steps] = at_breaks
+    return ConstraintRows(**near), ConstraintRows(**far)
 
 
 def _works(

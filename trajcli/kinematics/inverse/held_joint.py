@@ -171,9 +171,9 @@ class _Slide:
         self._robot, self._poses, self._near = robot, poses, near
         low, high = robot.limits.position.T
         inside = np.abs(beyond(start, robot.limits.position)).max(axis=1) < _LONGEST
-        self._low = np.where(inside[:, None], low, np.minimum(low, start))
-        self._high = np.where(inside[:, None], high, np.maximum(high, start))
-        self._bounds = np.stack([self._low, self._high], axis=1)
+        low = np.where(inside[:, None], low, np.minimum(low, start))
+        high = np.where(inside[:, None], high, np.maximum(high, start))
+        self._bounds = np.stack([low, high], axis=1)
         self._length = characteristic_length(robot)
         self.joints = start.copy()
         self.settled: Flags = np.zeros(len(start), dtype=bool)
@@ -190,7 +190,7 @@ class _Slide:
         rows = np.flatnonzero(~arrived[owners])
         if len(rows):
             self._follow(rows, np.ones(len(rows)), _MANY_ROUNDS, np.inf)
-        q, low, high = self.joints, self._low, self._high
+        q, low, high = self.joints, self._bounds[:, 0], self._bounds[:, 1]
         q = np.where(np.abs(q - low) <= _AT_LIMIT, np.maximum(q, low), q)
         self.joints = np.where(np.abs(q - high) <= _AT_LIMIT, np.minimum(q, high), q)
 
