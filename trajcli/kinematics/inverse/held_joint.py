@@ -95,13 +95,12 @@ class _Samples:
         offset = np.mod(np.clip(near[:, -1], low, high) - low, step)
         self._last: Array = np.clip(low + offset + step * np.arange(-1, _SAMPLES + 1)[:, None], low, high)
         count, samples = len(near), len(self._last)
-        flat = np.tile(poses, (samples, 1, 1))
-        wanted = poses_for_the_others(robot, flat, self._last.reshape(-1))
-        raw = candidates(held, axis_geometry(held), method_for(held), wanted)
+        wanted = poses_for_the_others(robot, poses, self._last)
+        raw = candidates(held, axis_geometry(held), method_for(held), wanted.reshape(-1, 4, 4))
         branches = raw.joints.shape[1]
         joints = np.empty((near.shape[1], branches, samples * count))
         joints[:-1], joints[-1] = raw.joints, self._last.reshape(-1)
-        choose_turns(robot, joints, np.tile(near, (samples, 1)).T)
+        choose_turns(robot, joints.reshape(len(joints), -1, count), near.T)
         self.joints = joints.reshape(near.shape[1], branches, samples, count)
         gap = np.square(self.joints - near.T[:, None, None]).sum(axis=0)
         met = raw.residuals.max(axis=0).reshape(gap.shape) <= _MET
@@ -131,12 +130,12 @@ class _Samples:
         """
         best, ranked = self._local_minima()
         met = np.isfinite(ranked) & ((ranked < _OUTSIDE) | (ranked.min(axis=0) >= _OUTSIDE))
-        ends = [np.clip(best + k, 0, self.cost.shape[1] - 1) for k in (-1, 0, 1)]
-        below, here, above = (_chosen(self.joints, k) for k in ends)
-        costs = [_chosen(self.cost, k) for k in ends]
+        beside = np.array([-1, 0, 1])[:, None, None]
+        ends = np.clip(best + beside[..., None], 0, self.cost.shape[1] - 1)
+        (below, here, above), costs = _chosen(self.joints, ends).swapaxes(0, 1), _chosen(self.cost, ends)
         apart = np.maximum(np.abs(above - here), np.abs(here - below)).max(axis=0)
         usable = np.isfinite(costs[0] + costs[1] + costs[2]) & (apart < _ALIKE)
-        safe = [np.where(usable, cost, k * k) for cost, k in zip(costs, (-1, 0, 1), strict=True)]
+        safe = np.where(usable, costs, beside**2)
         bend = safe[0] - 2.0 * safe[1] + safe[2]
         usable &= bend > 0.0
         bend = np.where(usable, bend, 1.0)
@@ -149,8 +148,8 @@ class _Samples:
 
 
 def _chosen(values: Array, index: NDArray[np.intp]) -> Array:
-    """Return (..., branches * starts, B) of values (..., branches, samples, B), by index."""
-    branches, poses = (np.arange(count) for count in (len(index), index.shape[-1]))
+    """Return (..., k, branches * starts, B) of values (..., branches, samples, B), by index (k, ...)."""
+    branches, poses = (np.arange(count) for count in (index.shape[1], index.shape[-1]))
     taken = values[..., branches[:, None, None], index, poses]
     return np.asarray(taken.reshape(*taken.shape[:-3], -1, taken.shape[-1]))
 

@@ -43,15 +43,15 @@ def without_last_joint(robot: Robot) -> Robot | None:
 
 
 def poses_for_the_others(robot: Robot, poses: Array, last: Array) -> Array:
-    """Return the poses (N, 4, 4) that the arm without its last joint reaches where that joint is at `last`.
+    """Return the poses (..., N, 4, 4) that the arm without its last joint reaches with that joint at `last`.
 
     Args:
         robot: An arm whose last joint turns.
         poses: T_world_tcp, shape (N, 4, 4).
-        last: Shape (N,), rad.
+        last: Shape (..., N), rad.
     """
     fixed, along, across = _parts_of_change(robot)
-    change = np.cos(last)[:, None, None] * along + np.sin(last)[:, None, None] * across + fixed
+    change = np.cos(last)[..., None, None] * along + np.sin(last)[..., None, None] * across + fixed
     return np.asarray(poses @ change)
 
 
