@@ -109,7 +109,8 @@ def interval_rows(grid: Array, constraints: Sequence[PathConstraint], stops: Arr
     cap[np.isin(grid, stops)] = 0.0
     turning, cap = turns < cap, np.minimum(cap, turns)
     owners = np.repeat(np.arange(len(near_rows)), [rows.a.shape[1] for rows in near_rows])
-    P, R, C = _integrated(near, far, D, _works(near_rows, far_rows, owners, D))
+    parts = [_integrated(*ends, D) for ends in at_ends]
+    P, R, C = (np.concatenate(part) for part in zip(*parts, strict=True))
     sources = np.arange(owners.size)
     turned = np.isnan(C)
     if turned.any():
@@ -144,39 +145,32 @@ def _at_ends(constraint: PathConstraint, grid: Array) -> tuple[ConstraintRows, C
     return ConstraintRows(**near), ConstraintRows(**far)
 
 
-def _works(
-    near_rows: Sequence[ConstraintRows],
-    far_rows: Sequence[ConstraintRows],
-    owners: NDArray[np.intp],
-    D: Array,
-) -> Array:
-    """Return the integrals of c a over the intervals where they are known, else NaN, shape (k, N).
+def _integrated(near: ConstraintRows, far: ConstraintRows, D: Array) -> tuple[Array, Array, Array]:
+    """Return P, R and C of the k rows times |a|, integrated, each (k, N); C is NaN where a changes its sign.
+
+    Where the integrals of c a are not known the others are trapezoids.
+    """
+    a0, a1 = near.a.T, far.a.T
+    sign = np.sign(a0 + a1)
+    if near.work is not None and far.work is not None:
+        works = _works(near, far, near.work.T, far.work.T, D)
+        return sign * a0 * -a0, sign * a1 * a1, np.maximum(sign * (2.0 * works), 0.0)
+    with np.errstate(invalid="ignore"):
+        C = sign * (D * (a0 * near.c.T + a1 * far.c.T))
+    same = a0 * a1 >= -_FLAT * np.maximum(a0**2, a1**2)
+    C = np.where(same, np.where(np.isnan(C), np.inf, np.maximum(C, 0.0)), np.nan)
+    return sign * a0 * (near.b.T * D - a1), sign * a1 * (far.b.T * D + a0), C
+
+
+def _works(near: ConstraintRows, far: ConstraintRows, start: Array, end: Array, D: Array) -> Array:
+    """Return the integrals of c a over the intervals (k, N) from their antiderivatives at both ends (k, N).
 
     Where they are small against what they are the difference of, the trapezoidal rule with end correction,
     which is exact up to the third degree of a, is free of its rounding.
     """
-    works = np.full((owners.size, D.size), np.nan)
-    for k, (start, end) in enumerate(zip(near_rows, far_rows, strict=True)):
-        if start.work is not None and end.work is not None:
-            found = (end.work - start.work).T
-            rule = 0.5 * D * (start.a + end.a).T - D**2 / 12.0 * (end.b - start.b).T
-            sizes = _SMALL * np.maximum(np.abs(end.work), np.abs(start.work)).T
-            works[owners == k] = np.where(np.abs(found) > sizes, found, start.c.T * rule)
-    return works
-
-
-def _integrated(
-    near: tuple[Array, Array, Array], far: tuple[Array, Array, Array], D: Array, works: Array
-) -> tuple[Array, Array, Array]:
-    """Return P, R and C of the rows times |a|, integrated; by trapezoids where their works are NaN."""
-    (a0, b0, c0), (a1, b1, c1) = near, far
-    exact, sign = ~np.isnan(works), np.sign(a0 + a1)
-    P = sign * a0 * np.where(exact, -a0, b0 * D - a1)
-    R = sign * a1 * np.where(exact, a1, b1 * D + a0)
-    with np.errstate(invalid="ignore"):
-        C = sign * np.where(exact, 2.0 * works, D * (a0 * c0 + a1 * c1))
-    same = exact | (a0 * a1 >= -_FLAT * np.maximum(a0**2, a1**2))
-    return P, R, np.where(same, np.where(np.isnan(C), np.inf, np.maximum(C, 0.0)), np.nan)
+    found, sizes = end - start, _SMALL * np.maximum(np.abs(end), np.abs(start))
+    rule = 0.5 * D * (near.a + far.a).T - D**2 / 12.0 * (far.b - near.b).T
+    return np.where(np.abs(found) > sizes, found, near.c.T * rule)
 
 
 def _at_both_ends(
