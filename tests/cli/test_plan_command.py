@@ -238,7 +238,11 @@ def test_one_error_for_each_move_and_kind(job: Path, capfd: Capture) -> None:
     [
         (("plan", "--errors", "json"), "Missing argument 'JOB'."),
         (("plan", "a", "--nothing", "--errors=json"), "No such option: --nothing"),
-        (("plan", "a", "--digits", "5", "--errors", "json"), "Invalid value for '--digits'"),
+        (
+            ("plan", "a", "--digits", "5", "--errors", "json"),
+            "Invalid value for '--digits': '5' is not one of 'fixed'",
+        ),
+        (("robots", "--joints", "six", "--errors", "json"), "Invalid value for '--joints': 'six'"),
         (("plam", "--errors", "json"), "Did you mean 'plan'"),
     ],
 )

@@ -58,6 +58,17 @@ class Commands(typer.core.TyperGroup):
             ctx.fail(f"No such command '{args[0]}': here it is `{known}`.")
         return super().resolve_command(ctx, args)
 
+    def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
+        """Run a command; of a wrong value its option, what was given and the reason are told."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            found = getattr(error.__cause__, "errors", list)()
+            given = repr(found[0]["input"]) if found else ""
+            reason = error.message.removeprefix("Value error, ")
+            error.message = reason if given in reason else f"{given}: {reason}"
+            raise
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the commands by group, each with the first sentence of its help, uncut."""
         for title, words in GROUPS.items():
