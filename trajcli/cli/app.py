@@ -59,14 +59,14 @@ class Commands(typer.core.TyperGroup):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
-        """Run a command; of a wrong value its option, what was given and the reason are told."""
+        """Run a command; of a wrong value the reason is said, and what was given."""
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
-            found = getattr(error.__cause__, "errors", list)()
-            given = repr(found[0]["input"]) if found else ""
-            reason = error.message.removeprefix("Value error, ")
-            error.message = reason if given in reason else f"{given}: {reason}"
+            error.message = error.message.removeprefix("Value error, ")
+            found: list[Any] = getattr(error.__cause__, "errors", list)()
+            if found and repr(found[0]["input"]) not in error.message:
+                error.message = f"{found[0]['input']!r}: {error.message}"
             raise
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
