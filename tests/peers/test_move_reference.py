@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,28 @@ def test_ruckig_does_not_know_limits_of_position() -> None:
     gentle = fastest_duration(resting(np.array([0.0])), resting(np.array([1.0])), robot.limits)
     assert isinstance(gentle, LowerBound)
     assert gentle.breaches == ()
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_of_several_joints_those_are_named_that_pass_a_limit(side: float) -> None:
+    """The second one is as above, one way or the other; the third one runs past by less; the others rest or are slow."""
+    from trajcli.kinematics.robot import unlimited
+    from trajcli.peers.lower_bound import fastest_duration
+    from trajcli.trajectory import State
+
+    fast, ones = np.array([0.0, 1.0, 1.0, 0.0]), np.ones(4)
+    both = np.array([-1.0, 1.0])
+    position = np.sort(side * np.array([[-1.05, 1.05]]) * ones[:, None], axis=1)
+    position[2] = np.sort(side * np.array([-1.05, 1.6]))
+    bounds = (both * size * ones[:, None] for size in (1.0, 2.0, 20.0))
+    limits = replace(unlimited(4), **dict(zip(("velocity", "acceleration", "jerk"), bounds, strict=True)))
+    start = State(side * np.array([0.0, 0.9, 0.9, 0.5]), side * fast, np.zeros(4))
+    end = State(side * np.array([0.5, 1.0, 1.0, 0.5]), np.zeros(4), np.zeros(4))
+    bound = fastest_duration(start, end, replace(limits, position=position))
+    assert isinstance(bound, LowerBound)
+    (breach,) = bound.breaches
+    assert (breach.order, breach.joint, breach.limit) == (0, 1, side * 1.05)
+    assert side * breach.value == pytest.approx(0.9 + 0.1 - 20 * 0.1**3 / 6 + 0.9**2 / 4, abs=1e-9)
 
 
 def test_a_bound_from_below_is_the_closed_form() -> None:

@@ -8,6 +8,7 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -81,11 +82,8 @@ def polynomial_intervals(
     nothing = max(smallest, _NOTHING_OF_ALL * float(terms.max()))
     local = _without_noise(coefficients[::-1].T, ends - starts, nothing)
     absolute = _without_noise(taylor_shift(coefficients, -starts)[::-1].T, ends, nothing)
-    like = np.append(False, _equal(absolute[:-1], absolute[1:], ends[1:], 2 * _SAME))  # as the one before
-    firsts, lasts = [0], ends.tolist()
-    for piece in range(1, len(lasts)):
-        if not (join and like[piece] and _equal(absolute[firsts[-1]], absolute[piece], ends[piece], _SAME)):
-            firsts.append(piece)
+    firsts = _firsts(absolute, ends) if join else list(range(ends.size))
+    lasts = ends.tolist()
     columns = {"start": starts[firsts], "end": ends[[first - 1 for first in [*firsts[1:], len(lasts)]]]}
     columns |= {"local": local[firsts], "absolute": absolute[firsts]}
     if origin:
@@ -107,6 +105,18 @@ def _without_noise(coefficients: Array, durations: Array, nothing: float) -> Arr
     terms = np.abs(coefficients) * durations[:, None] ** np.arange(coefficients.shape[1])
     least = np.maximum(_NOTHING * terms.max(axis=1, keepdims=True), nothing)
     return np.where(terms <= least, 0.0, coefficients)
+
+
+def _firsts(absolute: Array, ends: Array) -> list[int]:
+    """Return which of the polynomials (pieces, n) begin one that is another than those before it."""
+    like = np.append(False, _equal(absolute[:-1], absolute[1:], ends[1:], 2 * _SAME))  # as the one before
+    firsts = []
+    for first, stop in pairwise([*np.flatnonzero(~like).tolist(), len(like)]):
+        while first < stop:
+            firsts.append(first)
+            same = _equal(absolute[first], absolute[first + 1 : stop], ends[first + 1 : stop], _SAME)
+            first += 1 + int(np.append(same, False).argmin())
+    return firsts
 
 
 def _equal(a: Array, b: Array, durations: ArrayLike, same: float) -> Flags:

@@ -7,14 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from trajcli.curves.extrema import piece_extremes
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
+from trajcli.limits.tolerances import exceeds
 from trajcli.peers.path_reference import LimitBreach, breaches_of
 from trajcli.planners.ruckig import BoundaryProblem, fastest
 from trajcli.trajectory import State
 
+_Alone = tuple[int, PiecewisePolynomial, Limits]  # a joint, its motion by itself, and its limits
+_ORDERS = (0, 1, 2, 3)
 _ROUNDING = 1e-12
 _NOWHERE = 1e-9  # rad or m: a joint that comes back so near to where it was need not move
 _NOTHING = 1e-9  # rad or m, and of the velocity limit: what rounding leaves of a joint that rests
@@ -62,7 +66,7 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
         limits: Those that the motion was judged by.
     """
     bound = LowerBound(0.0, None)
-    breaches: list[LimitBreach] = []
+    motions: list[_Alone] = []
     for joint in range(start.position.size):
         problem = _problem(start, end, limits, joint)
         if problem.done or _hardly_moves(problem):
@@ -78,8 +82,9 @@ def fastest_duration(start: State, end: State, limits: Limits) -> LowerBound | N
             return NoBound("its start state leads out of its limits", joint)
         if profile.duration > bound.duration:
             bound = LowerBound(profile.duration, joint)
-        breaches += _breaches(profile.curve(), limits.position[joint], problem, joint)
-    return replace(bound, breaches=tuple(breaches))
+        own = Limits(limits.position[joint][None], *(problem.bounds[order][None] for order in range(3)))
+        motions.append((joint, profile.curve(), own))
+    return replace(bound, breaches=tuple(_breaches(motions)))
 
 
 def duration_through(points: Array, start: State, end: State, limits: Limits) -> LowerBound:
@@ -114,13 +119,24 @@ def duration_through(points: Array, start: State, end: State, limits: Limits) ->
     )
 
 
-def _breaches(
-    curve: PiecewisePolynomial, position: Array, problem: BoundaryProblem, joint: int
-) -> Iterator[LimitBreach]:
-    """Yield the limits of one joint that its motion breaks: of position, and those that were given."""
-    own = Limits(position[None], *(problem.bounds[order][None] for order in range(3)))
-    for breach in breaches_of(curve, own, (0, 1, 2, 3)):
-        yield replace(breach, joint=joint)
+def _breaches(motions: Sequence[_Alone]) -> Iterator[LimitBreach]:
+    """Yield the limits that motions of single joints break, those of the position among them.
+
+    All of them are looked at together, and closely only those that pass one.
+    """
+    if not motions:
+        return
+    curves = [curve for _, curve, _ in motions]
+    owner = np.repeat(np.arange(len(curves)), [curve.pieces for curve in curves])
+    polynomials = np.concatenate([curve.coefficients for curve in curves], axis=1)
+    lengths, passed = np.concatenate([curve.lengths for curve in curves]), np.zeros(owner.size, dtype=bool)
+    for order, (low, high) in enumerate(piece_extremes(polynomials, lengths, _ORDERS)):
+        bounds = np.concatenate([limits.of_order(order) for *_, limits in motions])[owner]
+        passed |= exceeds(high[:, 0], bounds[:, 1]) | exceeds(-low[:, 0], -bounds[:, 0])
+    for index in np.unique(owner[passed]).tolist():
+        joint, curve, limits = motions[index]
+        for breach in breaches_of(curve, limits, _ORDERS):
+            yield replace(breach, joint=joint)
 
 
 def _problem(start: State, end: State, limits: Limits, joint: int) -> BoundaryProblem:
