@@ -50,7 +50,7 @@ def pack(wheel: Path) -> None:
         files = [(info, built.read(info)) for info in built.infolist()]
     with wheel.open("wb") as out, ZipFile(out, "w") as packed:
         for info, content in files:
-            data = compress(content, numiterations=30)[2:-4]  # without the head and the sum of zlib
+            data = compress(content, numiterations=45)[2:-4]  # without the head and the sum of zlib
             info.header_offset, info.flag_bits = out.tell(), 0
             info.compress_type, info.compress_size = ZIP_DEFLATED, len(data)
             out.write(info.FileHeader() + data)

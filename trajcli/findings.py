@@ -55,10 +55,10 @@ class Finding:
     """
 
     kind: str
-    joint: str | None
-    value: float | None
-    limit: float | None
-    time: float | None
+    joint: str | None = None
+    value: float | None = None
+    limit: float | None = None
+    time: float | None = None
     move: int | None = None
     row: int | None = None
     rule: str = "limit"

@@ -118,7 +118,6 @@ def _check_pose(
             continue
         finding = Finding(
             move=span.index,
-            joint=None,
             kind="target",
             value=value,
             limit=limit,

@@ -141,7 +141,6 @@ def _check_path(tool: SampledTool) -> list[Finding]:
             when += tool.span.start
             finding = Finding(
                 move=tool.span.index,
-                joint=None,
                 kind=kind,
                 value=value,
                 limit=limit,
@@ -175,7 +174,6 @@ def _check_branch(tool: SampledTool) -> list[Finding]:
     when = tool.span.start + float(tool.times[changes[0] - 1])
     finding = Finding(
         move=tool.span.index,
-        joint=None,
         kind="branch",
         value=0.0,
         limit=0.0,

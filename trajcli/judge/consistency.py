@@ -253,7 +253,6 @@ class _Judge:
             )
         return Finding(
             rule={"jump": "continuity", "derivative": "derivative"}.get(kind, "path"),
-            severity="error",
             kind=kind,
             joint=self.axes.joint_names[joint],
             value=value,

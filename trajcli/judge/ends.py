@@ -96,7 +96,6 @@ def _position(
     return [
         Finding(
             rule="state",
-            severity="error",
             kind=kind,
             joint=axes.joint_names[joint],
             value=value,
@@ -187,9 +186,7 @@ def judge_order_of_stamps(
         value_and_limit = (time, last) if np.isfinite(time) else (None, None)
         return Finding(
             rule="time",
-            severity="error",
             kind="time",
-            joint=None,
             value=value_and_limit[0],
             limit=value_and_limit[1],
             time=value_and_limit[0],

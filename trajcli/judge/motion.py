@@ -287,7 +287,6 @@ class MotionJudge:
                 rule="time",
                 severity="warning",
                 kind="time",
-                joint=None,
                 value=length,
                 limit=length / times,
                 time=float(window.t[at + 1]),

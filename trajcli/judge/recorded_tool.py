@@ -279,7 +279,6 @@ class ToolJudge:
                 rule="path",
                 severity="warning",
                 kind="singularity",
-                joint=None,
                 value=float(share[near[k]]),
                 limit=_NEAR_SINGULAR,
                 time=time,

@@ -326,9 +326,7 @@ class _Judge:
             subject = "the tool" if what == "tool" else f"the {what} of the tool"
             return Finding(
                 rule="derivative" if order else "path",
-                severity="error",
                 kind="tool",
-                joint=None,
                 value=value,
                 limit=limit,
                 time=time,

@@ -342,11 +342,7 @@ class RecordedPath:
             time = float(t[changes[k]])
             return Finding(
                 rule="path",
-                severity="error",
                 kind="branch",
-                joint=None,
-                value=None,
-                limit=None,
                 time=time,
                 row=int(numbers[changes[k]]),
                 method="sampled",
@@ -363,9 +359,7 @@ def _deviation(quantity: str, value: float, limit: float, time: float, row: int,
     what = "is beside" if quantity == "position" else "is turned from"
     return Finding(
         rule="path",
-        severity="error",
         kind="deviation",
-        joint=None,
         value=value,
         limit=limit,
         time=time,

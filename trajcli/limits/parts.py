@@ -38,7 +38,6 @@ def part_findings(move: LimitedMove, around: ZoneAround | None) -> Iterator[Find
     how = f"{share:.9g} times as far from its corner as it may be"
     yield Finding(
         move=move.span.index,
-        joint=None,
         kind="zone",
         value=share,
         limit=1.0,

@@ -84,7 +84,6 @@ def _stepping(step: ToolStep, kind: LimitKind, begins: float) -> Finding:
     time = begins + step.time
     return Finding(
         kind=f"{step.kind.name}_jump",
-        joint=None,
         value=step.size,
         limit=0.0,
         time=time,
@@ -108,7 +107,6 @@ def tool_excess(kind: LimitKind, value: float, limit: float, time: float, *, sti
     factor = (value / limit) ** (1 / order)
     return Finding(
         kind=kind.name,
-        joint=None,
         value=value,
         limit=limit,
         time=time,
