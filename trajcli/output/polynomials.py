@@ -7,6 +7,7 @@ Source: Siciliano et al., Robotics: Modelling, Planning and Control (2009), sect
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from itertools import pairwise
 
@@ -131,27 +132,27 @@ def multiples_of_pi(values: ArrayLike) -> list[str | None]:
 
     A number is such a multiple where ten digits do not tell it from one with small integers.
     """
-    ratios = np.asarray(values, dtype=np.float64).reshape(-1) / np.pi
-    texts: list[str | None] = [None] * ratios.size
-    left = np.flatnonzero((np.abs(ratios) <= _NUMERATOR) & (np.abs(ratios) >= 0.5 / _DENOMINATOR))
-    rest = np.abs(ratios[left])
-    before, last = np.array([[0.0], [1.0]]), np.array([[1.0], [0.0]])  # numerators and denominators
+    return [_multiple(ratio) for ratio in (np.asarray(values, dtype=np.float64).reshape(-1) / np.pi).tolist()]
+
+
+def _multiple(ratio: float) -> str | None:
+    """Return the multiple of pi that a ratio to it is, by convergents of its continued fraction; or None."""
+    size = rest = abs(ratio)
+    if not 0.5 / _DENOMINATOR <= size <= _NUMERATOR:
+        return None
+    before, last = (0.0, 1.0), (1.0, 0.0)  # numerators and denominators
     for _ in range(_CONVERGENTS):
-        if not left.size:
-            break
-        whole = np.floor(rest)
-        before, last = last, whole * last + before
-        size = np.abs(ratios[left])
-        small = (last[1] <= _DENOMINATOR) & (last[0] <= _NUMERATOR)
-        near = small & (np.abs(last[0] - size * last[1]) <= _DIGITS * last[0])
-        for index, (numerator, denominator) in zip(
-            left[near].tolist(), last[:, near].T.tolist(), strict=True
-        ):
-            texts[index] = _of_pi(int(np.copysign(numerator, ratios[index])), int(denominator))
-        going = small & ~near & (rest > whole)
-        left, rest = left[going], 1 / (rest - whole)[going]
-        before, last = (np.broadcast_to(each, (2, going.size))[:, going] for each in (before, last))
-    return texts
+        whole = float(math.floor(rest))
+        before, last = last, (whole * last[0] + before[0], whole * last[1] + before[1])
+        numerator, denominator = last
+        if denominator > _DENOMINATOR or numerator > _NUMERATOR:
+            return None
+        if abs(numerator - size * denominator) <= _DIGITS * numerator:
+            return _of_pi(int(math.copysign(numerator, ratio)), int(denominator))
+        if rest == whole:
+            return None
+        rest = 1 / (rest - whole)
+    return None
 
 
 def _of_pi(numerator: int, denominator: int) -> str:
