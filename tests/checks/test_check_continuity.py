@@ -63,6 +63,18 @@ def test_a_jump_of_two_billionths_of_the_peak_is_found_and_one_of_half_a_billion
     assert found[0].factor is None
 
 
+@pytest.mark.parametrize("first", [True, False])
+def test_a_jump_is_measured_by_the_largest_value_of_the_whole_motion(first: bool) -> None:
+    """Half a billionth of the peak, which another move reaches: that one goes to 2000, and this one from 1 to 2."""
+    small, large = with_jump("position", 0.5e-9 * 2000), between([1.0], [2000.0], [1.0])
+    moves = (large, small) if first else (small, large)
+    assert check_continuity(trajectory(*moves), [LIMITED, LIMITED]) == []
+    quick = between([2000.0], [1.0], [2000.0], duration=1.0)  # another joint, which is no measure of the first
+    rows = np.concatenate([small.coefficients, quick.coefficients], axis=2)
+    (found,) = check_continuity(trajectory(PiecewisePolynomial(small.breaks, rows)), [limits(2, jerk=1e9)])
+    assert (found.kind, found.joint) == ("position_jump", "j1")
+
+
 def test_a_valid_motion_has_no_jumps() -> None:
     for conditions in (3, 4):
         curve = between(
@@ -238,10 +250,14 @@ def test_a_steep_ramp_is_not_a_jump(acceleration: float) -> None:
     assert len(steps_of(whole)) == 4
 
 
+@pytest.mark.parametrize("block", [1, 2, 16_384])
 @pytest.mark.parametrize("speed", [1e13, -1e13])
 @pytest.mark.parametrize("before", [True, False])
-def test_a_position_is_late_by_the_slope_on_either_side_of_its_break(before: bool, speed: float) -> None:
+def test_a_position_is_late_by_the_slope_on_either_side_of_its_break(
+    before: bool, speed: float, block: int, monkeypatch
+) -> None:
     """By a unit in the last place of the break at 1 s, times a slope that is there on one side alone, and shortly."""
+    monkeypatch.setattr(continuity, "_BLOCK", block)
     late = speed * np.spacing(1.0)
     border = 1.0 - 1e-14 if before else 1.0 + 1e-14
     way = speed * abs(border - 1.0)

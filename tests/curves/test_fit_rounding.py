@@ -54,27 +54,34 @@ def off_by(order, tolerance):
     return lambda known, rows, fitted: np.abs(fitted - known.values[:, rows])[order].max(axis=1) / tolerance
 
 
+@pytest.mark.parametrize("level", [1.5, 1e-2])
 @pytest.mark.parametrize("width", [1e-3, 1e-5])
 @pytest.mark.parametrize("order", [0, 1])
-def test_noise_in_values_and_slopes_is_not_refined_away(order, width):
-    """Of ends that are off by two units each the slope between them holds 15 / 8 of four units."""
+def test_noise_in_values_and_slopes_is_not_refined_away(order, width, level):
+    """Of ends that are off by two units each the slope between them holds 15 / 8 of four units.
+
+    So are those of small numbers: a search rounds as the numbers of its arm do, which are about 1. Between the ends
+    a curvature that nobody asks about may be anything.
+    """
+    breaks = 1.0 + width * np.arange(41)
 
     def half_as_noisy(places, side, guess):
         known = noisy(places, side, guess)
-        known.values[0] = 1.5 + (known.values[0] - 1.5) / 2
+        known.values[0] = level + (known.values[0] - 1.5) / 2
+        known.values[2] = np.where(np.isin(places, breaks), 0.0, 1.0 / width**2)[:, None]
         return known
 
-    breaks = 1.0 + width * np.arange(41)
     curve = fit(half_as_noisy, off_by(order, ULP / 8 if order == 0 else 1e-14), breaks, flat)
     assert curve.pieces == 40
 
 
+@pytest.mark.parametrize("times", [1.1, 2.0])
 @pytest.mark.parametrize(
     ("order", "share"),
     [(0, 1 / 64), (1, 0.04 * 0.6 * 5**0.5), (2, 0.375)],
     ids=["value", "slope", "curvature"],
 )
-def test_what_rounding_does_not_explain_is_refined(order, share):
+def test_what_rounding_does_not_explain_is_refined(order, share, times):
     """Of a x^6 a quintic piece leaves out a (x - b)^3 (e - x)^3, of which `share` is the largest by its derivatives.
 
     That is many times what values that are off by half a unit each could do, which is all that they are here.
@@ -89,9 +96,10 @@ def test_what_rounding_does_not_explain_is_refined(order, share):
 
     curve = fit(
         lambda places, side, guess: Known(power(places)),
-        off_by(order, error / 2),
+        off_by(order, error / times),
         np.array([0.0, length]),
         flat,
     )
+    assert curve.pieces > 1
     t = np.linspace(0.0, length, 4001)
-    assert np.abs(curve.evaluate(t, order) - power(t)[order]).max() <= 0.6 * error
+    assert np.abs(curve.evaluate(t, order) - power(t)[order]).max() <= error / times * 1.2

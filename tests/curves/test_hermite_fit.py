@@ -9,7 +9,7 @@ import pytest
 from hermite_curves import hermite_pieces
 from scipy.optimize import brentq
 
-from trajcli.curves.hermite_fit import FitError, fit
+from trajcli.curves.hermite_fit import MOST_PIECES, FitError, fit
 from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import PiecewisePolynomial
 
@@ -181,10 +181,30 @@ def test_a_function_that_no_quintics_follow_is_named_with_its_place():
     assert "times the tolerance" in str(caught.value)
 
 
+def test_the_place_of_a_misfit_is_where_it_is_worst():
+    """One piece is judged at its middle and at a tenth of the root of 5 beside it: the last is nearest to the hump."""
+
+    def hump(t):
+        x = 8 * (t - 2.2)
+        return (np.exp(-(x**2)) * np.stack([1 + 0 * x, -16 * x, 256 * x**2 - 128]))[..., None]
+
+    with pytest.raises(FitError) as caught:
+        fit(known(hump), within(1e-4), ENDS, lambda t: np.zeros((t.size, 1)), at_most=1)
+    assert caught.value.at == pytest.approx(1.5 + 0.3 * np.sqrt(5), abs=1e-12)
+
+
 def test_the_number_of_pieces_is_bounded():
     with pytest.raises(FitError):
         fit(known(waves), within(1e-9), ENDS, nothing, at_most=20)
     assert fit(known(waves), within(1e-9), ENDS, nothing, at_most=400).pieces <= 400
+
+
+def test_a_long_way_with_many_breaks_may_have_more_pieces_than_a_short_one():
+    breaks = np.linspace(0.0, 120.0, 41)
+    curve = fit(known(waves), within(2e-9), breaks, nothing)
+    assert curve.pieces > MOST_PIECES
+    t = np.linspace(0.0, 120.0, 9001)
+    assert np.abs(curve.evaluate(t) - waves(t)[0]).max() <= 2e-9
 
 
 @pytest.mark.parametrize("width", [1e-5, 1e-7])

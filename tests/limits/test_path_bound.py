@@ -10,6 +10,7 @@ import pytest
 
 from trajcli.checks.tool import SampledTool, check_tool
 from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
+from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation
 from trajcli.geometry.paths.pose import PoseCurve, PosePath
@@ -20,6 +21,7 @@ from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.limits import path_bound
 from trajcli.trajectory import Span, Trajectory, resting
 
@@ -68,9 +70,10 @@ def tool(
     orientation: str = "all",
     position: tuple[bool, bool, bool] = WHOLE,
     start: float = 0.0,
+    tolerances: tuple[float, float] = (TOLERANCE, TOLERANCE),
 ) -> SampledTool:
     path = ToolPath(poses or line(), position, orientation)  # type: ignore[arg-type]
-    motion = motion_along(path, law, law.breaks, Tolerance(TOLERANCE, TOLERANCE))
+    motion = motion_along(path, law, law.breaks, Tolerance(*tolerances))
     span = Span(4, "line", start, start + law.duration, 2)
     ends = resting(Q), resting(Q)
     curve = concatenate([constant(Q, start), joints]) if start else joints
@@ -189,6 +192,57 @@ def test_what_is_free_does_not_count() -> None:
     assert most(tool(rolled, law(), orientation="none"))[1] == 0.0
     bent = tool(standing(4, 1.5 * TOLERANCE), law(), orientation="direction")
     assert most(bent)[1] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+    across = ToolPath(line(), WHOLE, "direction", "x")  # square to the axis of the last joint, which turns it
+    motion = replace(bent.motion, path=across)
+    assert most(replace(bent, motion=motion))[1] != pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+    turned = replace(tool(rolled, law(), orientation="direction"), motion=motion)
+    assert most(turned)[1] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+
+
+@pytest.mark.parametrize("tolerances", [(TOLERANCE, 1.0), (1.0, TOLERANCE)])
+def test_each_bound_is_as_near_as_its_own_tolerance_asks(tolerances: tuple[float, float]) -> None:
+    """A turn about z in world, of the tool by its lever and by an angle: one of the two is asked for closely."""
+    which = tolerances.index(TOLERANCE)
+    angle = 1.5 * TOLERANCE / (1.0 if which else float(np.hypot(*POSE[:2, 3])))
+    found = most(tool(standing(0, angle), law(), tolerances=tolerances))[which]
+    assert found == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_breaks_of_a_law_count_whether_the_reference_steps_there_or_not(ends: bool) -> None:
+    """A smooth law in pieces has no breaks of its own: each of its polynomials is bounded where it holds."""
+    joints = PiecewisePolynomial(np.array([0.0, 3.0]), Q[None, None])
+    each = tool(joints, law(1.5 * TOLERANCE))
+    if ends:
+        each = replace(each, motion=replace(each.motion, breaks=each.motion.breaks[[0, -1]]))
+    assert most(each)[0] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+
+
+@pytest.mark.parametrize("share", [0.06, 0.44, 0.94])
+def test_a_corner_within_a_piece_of_the_law_is_as_far_as_it_is(share: float) -> None:
+    """The joints rest beside a corner, before and behind which the path is nearer to them; it lies between the rows."""
+    along, aside, far = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.1, 0.0]), 1.5 * TOLERANCE
+    corner = POSE[:3, 3] + far * along
+    lines = join([Line(corner - REST * along, corner), Line(corner, corner - 0.2 * along + aside)])
+    poses = PoseCurve(lines, FixedOrientation(POSE[:3, :3], lines.length))
+    rows = np.array([1.6 * far, REST - share * 1.6 * far])[:, None, None]
+    joints = PiecewisePolynomial(np.array([0.0, 1.0]), Q[None, None])
+    each = tool(joints, PiecewisePolynomial(np.array([0.0, 1.0]), rows), poses)
+    assert most(each)[0] == pytest.approx(far, rel=4e-3)
+
+
+def test_a_piece_that_rounding_begins_before_a_border_is_of_the_segment_behind() -> None:
+    """A line and an arc about a tenth of a metre: of the arc the ninth derivative is that of a circle."""
+    radius, corner = 0.1, POSE[:3, 3] + np.array([0.1, 0.0, 0.0])
+    ends = (corner + radius * np.array([math.sin(angle), 1 - math.cos(angle), 0.0]) for angle in (0.5, 1.0))
+    arc = Arc.through(corner, *ends)
+    curve = join([Line(POSE[:3, 3], corner), arc])
+    path = ToolPath(PoseCurve(curve, FixedOrientation(POSE[:3, :3], curve.length)), WHOLE, "all")
+    coefficients = np.zeros((2, 1, 7))
+    coefficients[1, 0] = [*Q, 0.1 * (1 - 1e-15)]
+    coefficients[0, 0, -1] = 0.1
+    found = path_bound._of_path(path, np.array([1.0]), coefficients)[0, 9, 0]
+    assert found * math.factorial(9) == pytest.approx(radius * (0.1 / radius) ** 9, rel=1e-9)
 
 
 def test_what_has_no_bound_is_left_to_rows_and_said() -> None:
@@ -246,6 +300,31 @@ def test_what_has_no_majorant_is_not_proven_whatever_the_other_has(orientation: 
     assert most(each)[1] == pytest.approx(0.0, abs=1e-12)
     assert "distance from the path" in each.sampled
     assert "angle from its orientation" not in each.sampled
+
+
+def test_joints_that_turn_together_turn_the_tool_by_their_sum() -> None:
+    """Three parallel axes: the ninth derivative is that of the sum of their rates, and not of the fastest."""
+    coefficients = np.zeros((2, 1, 7))
+    coefficients[0, 0, 1:4], coefficients[1, 0, :6] = 2.0, Q
+    path = ToolPath(line(), WHOLE, "all")
+    _, ((_, highest),) = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
+    assert math.sqrt(1.5) * (1 - 1e-12) <= highest * math.factorial(9) / 6.0**9 <= 100.0
+
+
+def test_a_slide_is_as_long_as_it_stands() -> None:
+    """A joint that turns, and a slide behind it, five metres out: its end goes about a circle of five metres."""
+    joints = Joint("turn", alpha=math.pi / 2), Joint("slide", "prismatic")
+    polar = Robot("turning slide", joints, unlimited(2), "standard", np.eye(4), np.eye(4))
+    coefficients = np.zeros((2, 1, 3))
+    coefficients[0, 0, 0], coefficients[1, 0] = 2.0, [0.3, 5.0, REST]
+    path = ToolPath(line(), WHOLE, "none")
+    _, ((highest, _),) = path_bound._values_at_nodes(polar, path, coefficients, np.array([1e-6]))
+    assert 1 - 1e-12 <= highest * math.factorial(9) / (5.0 * 2.0**9) <= 10.0
+    coefficients[0, 0, :2] = [0.0, 2.0]  # and what slides turns nothing
+    _, ((_, highest),) = path_bound._values_at_nodes(
+        polar, replace(path, orientation="all"), coefficients, np.array([1e-6])
+    )
+    assert highest == 0.0
 
 
 @pytest.mark.parametrize("orientation", ["all", "direction"])
