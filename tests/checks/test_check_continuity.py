@@ -69,7 +69,9 @@ def test_a_jump_is_measured_by_the_largest_value_of_the_whole_motion(first: bool
     small, large = with_jump("position", 0.5e-9 * 2000), between([1.0], [2000.0], [1.0])
     moves = (large, small) if first else (small, large)
     assert check_continuity(trajectory(*moves), [LIMITED, LIMITED]) == []
-    quick = between([2000.0], [1.0], [2000.0], duration=1.0)  # another joint, which is no measure of the first
+    quick = between(
+        [2000.0], [1.0], [2000.0], duration=1.0
+    )  # another joint, which is no measure of the first
     rows = np.concatenate([small.coefficients, quick.coefficients], axis=2)
     (found,) = check_continuity(trajectory(PiecewisePolynomial(small.breaks, rows)), [limits(2, jerk=1e9)])
     assert (found.kind, found.joint) == ("position_jump", "j1")

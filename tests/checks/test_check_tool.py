@@ -133,6 +133,26 @@ def test_a_tool_beside_its_path(size):
     assert beside.factor is None
 
 
+@pytest.mark.parametrize(("position", "angle"), [(1e-3, 1e-6), (1e-6, 1e-3)])
+def test_a_tool_that_is_turned_is_measured_by_the_angle_that_was_promised(position, angle):
+    """The last joint turns it about its own axis, and moves it nowhere."""
+    rows = shifted(RIGHT, [0, 0, 0, 0, 0, 2e-5])
+    motion = dataclasses.replace(rows.motion, tolerance=Tolerance(position, angle))
+    found = judged(dataclasses.replace(rows, motion=motion))
+    assert [(each.kind, each.limit) for each in found] == [("tool_orientation", 1e-6)] * (angle < 2e-5)
+    both = dataclasses.replace(shifted(RIGHT, [2e-5, 0, 0, 0, 0, 0]), motion=motion)  # of either a little
+    assert kinds(judged(both)) == ["tool_orientation" if angle < position else "tool_path"]
+
+
+def test_rows_tell_distance_and_angle_apart_where_not_all_of_a_position_is_fixed():
+    rows, law = shifted(RIGHT, [0, 0, 0, 0, 0, 2e-5]), RIGHT.motion.law
+    path = ToolPath(RIGHT.motion.path.poses, (True, False, False), "all")
+    motion = motion_along(path, law, law.breaks, RIGHT.motion.tolerance)
+    distance, angle = dataclasses.replace(rows, motion=motion).deviation
+    assert distance.max() < 2e-6
+    assert angle == pytest.approx(2e-5, abs=2e-6)
+
+
 def test_a_tool_above_its_path():
     """The second joint lifts it: all three coordinates count."""
     rows = shifted(RIGHT, [0, 2e-5, 0, 0, 0, 0])
@@ -278,6 +298,12 @@ def test_an_elbow_that_straightens_through_changes_the_branch():
     assert found.kind == "branch"
     assert found.time == pytest.approx(1.1, abs=0.02)
     assert found.factor is None
+
+
+def test_of_several_changes_of_the_branch_the_first_is_named():
+    """0.3 - t + t^2 / 2 is zero twice, at 1 s less and more 0.632 s."""
+    (found,) = judged(planar(lambda t: 0.3 - t + t**2 / 2))
+    assert (found.kind, found.time) == ("branch", pytest.approx(1 - np.sqrt(0.4), abs=0.1))
 
 
 def test_a_determinant_of_zero_on_a_row_hides_no_change_of_branch():

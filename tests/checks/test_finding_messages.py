@@ -74,6 +74,12 @@ def test_a_position_is_no_matter_of_time() -> None:
     assert only(cubic(), limits(position=0.5), "position", promise) == (message, remedy)
 
 
+def test_slowing_is_advised_where_it_mends_all_that_is_wrong() -> None:
+    """In more time the speed is within its limit, and the end still beyond its range."""
+    bounds, promise = limits(velocity=1.0, position=0.5), Promise(ends=REST, over_limit="error")
+    assert only(cubic(), bounds, "velocity", promise)[1] == "it must last 1.5 times longer (1.5 s)"
+
+
 def test_a_slide_is_measured_in_metres() -> None:
     whole = replace(cubic(), joint_types=("prismatic",))
     message = "the velocity of j1 reaches 1.5 m/s at t = 0.5 s, its limit is 1 m/s"

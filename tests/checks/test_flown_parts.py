@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from motions import limits, trajectory
@@ -10,6 +12,14 @@ from trajcli.checks.verify import verify
 from trajcli.checks.zones import check_flown
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
+from trajcli.geometry.paths.orientation import FixedOrientation
+from trajcli.geometry.paths.pose import PoseCurve
+from trajcli.geometry.paths.position import Line
+from trajcli.job.robot import load_robot
+from trajcli.kinematics.following.motion import motion_along
+from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.kinematics.zone import Zone, ZoneAround
 from trajcli.trajectory import MoveInterval, Promise
@@ -81,6 +91,40 @@ def test_the_verdict_holds_what_is_wrong_with_parts() -> None:
     verdict = verify(whole, [FREE], [promise])
     assert not verdict.passed
     assert ("velocity", 0) in {(each.kind, each.move) for each in verdict.findings}
+
+
+def test_what_counts_for_a_move_in_parts_is_what_its_parts_allow() -> None:
+    """Limits of the whole move, which each part says otherwise, are no matter: of joints, and near their ends."""
+    whole, free = trajectory(steady(1.0, 2.0, 3.0)), limits(2, position=50.0)
+    bounds = replace(
+        limits(2, position=7.0, velocity=1.5), velocity_by_position=np.array([[np.inf, 0.0], [0.01, 0.0]])
+    )
+
+    def wrong(promise: Promise) -> set[str]:
+        kinds = {each.kind for each in verify(whole, [bounds], [promise]).findings}
+        return {kind for kind in kinds if "jump" not in kind}
+
+    assert wrong(Promise()) == {"velocity", "velocity_by_position"}
+    assert wrong(Promise(parts=(part(0, 1, free), part(1, 2, free), part(2, 3, free)))) == set()
+
+
+@pytest.mark.parametrize("beside", [0, 1])
+def test_the_tool_is_judged_in_each_part_that_follows_a_path(beside: int) -> None:
+    """The arm stands where both paths begin, but for one of them, which begins a millimetre above."""
+    arm = load_robot("planar2r")
+    pose = forward(arm, np.zeros(2))
+    paths = []
+    for k in range(2):
+        off = np.array([0.0, 0.0, 1e-3 * (k == beside)])
+        line = Line(pose[:3, 3] + off, pose[:3, 3] + off + np.array([0.0, 1.0, 0.0]))
+        paths.append(ToolPath(PoseCurve(line, FixedOrientation(pose[:3, :3], 1.0)), (True,) * 3, "all"))
+    law = PiecewisePolynomial(np.array([0.0, 1.0]), np.zeros((1, 1, 1)))
+    tools = [motion_along(path, law, law.breaks, Tolerance(1e-6, 1e-6)) for path in paths]
+    parts = [MoveInterval(k, k + 1.0, arm, tools[k]) for k in range(2)]
+    whole = trajectory(PiecewisePolynomial(np.array([0.0, 2.0]), np.zeros((1, 1, 2))))
+    (found,) = verify(whole, [FREE], [Promise(parts=tuple(parts), robot=arm)]).findings
+    assert (found.kind, found.value) == ("tool_path", pytest.approx(1e-3, rel=1e-5))
+    assert beside <= found.time <= beside + 1
 
 
 @pytest.mark.parametrize("move", [0, 1])

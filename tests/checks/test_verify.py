@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from motions import between, limits, state, trajectory
 
 from trajcli.checks.continuity import acceleration_steps, check_continuity
 from trajcli.checks.verify import check_limits, verify
-from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.piecewise import PiecewisePolynomial, constant
+from trajcli.kinematics.robot import Payload, ToolLimits
+from trajcli.trajectory import Promise, ViaPoints
 
 
 def test_a_valid_motion_passes_and_says_its_peaks() -> None:
@@ -53,6 +58,32 @@ def test_what_nobody_limits_is_said() -> None:
     assert verify(whole, [all_bounded, all_bounded]).unchecked == ()
     expected = (("j1", "velocity"), ("j1", "jerk"), ("j2", "jerk"))
     assert verify(whole, [all_bounded, open_ended]).unchecked == expected
+
+
+@pytest.mark.parametrize(("loaded", "unchecked"), [((), ()), ((1,), ()), ((2,), (("j1", "effort"),))])
+def test_efforts_are_left_unchecked_where_a_load_is_moved(loaded: tuple[int, ...], unchecked: Any) -> None:
+    """The second of three moves takes no time, and so nothing is moved in it."""
+    plain = trajectory(between([0.0], [1.0]), constant([1.0], 0.0), between([1.0], [0.0]))
+    load = Payload(1.0, np.zeros(3), np.eye(3))
+    spans = tuple(replace(span, payload=load) if span.index in loaded else span for span in plain.spans)
+    bounds = limits(position=9.0, velocity=9.0, acceleration=9.0, jerk=99.0)
+    assert verify(replace(plain, spans=spans), [bounds] * 3).unchecked == unchecked
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_limits_of_the_tool_that_no_arm_can_be_judged_by_are_named_of_all_moves(order: int) -> None:
+    whole = trajectory(between([0.0], [1.0]), between([1.0], [0.0]))
+    bounds = [replace(limits(), tcp=ToolLimits(**{name: 1.0})) for name in ("speed", "acceleration")][::order]
+    assert verify(whole, bounds).unchecked_of_tool == ("speed", "acceleration")
+
+
+@pytest.mark.parametrize("move", [0, 1])
+def test_via_points_of_one_move_are_judged_whatever_the_others_promise(move: int) -> None:
+    whole = trajectory(between([0.0], [1.0]), between([1.0], [0.0]))
+    passing = Promise(ViaPoints(np.array([1.0]), np.array([[0.5]]), np.array([[0.75]])))
+    promises = [passing, Promise()] if move == 0 else [Promise(), passing]
+    (found,) = verify(whole, [limits()] * 2, promises).findings
+    assert (found.kind, found.move) == ("waypoint", move)
 
 
 def test_limits_must_be_as_many_as_moves() -> None:

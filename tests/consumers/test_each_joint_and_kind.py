@@ -77,6 +77,22 @@ def test_the_approach_keeps_each_limit_of_each_joint(kind: str, joint: int, side
         assert over == ([(kind, f"joint_{joint + 1}")] if broken else [])
 
 
+@pytest.mark.parametrize("worse", [1, 2])
+def test_of_several_limits_that_the_approach_breaks_the_worst_is_named(worse: int) -> None:
+    """As above by a tenth, and one of the two by half."""
+    rows, stands = motion(period=0.1, rows=21), HOME[7].copy()
+    stands[2] -= 0.2
+    bounds = [np.tile([-np.inf, np.inf], (7, 1)) for _ in range(4)]
+    for kind in ("velocity", "acceleration"):
+        factor, order = PEAKS[kind]
+        bounds[order][2, 1] = factor * 0.2 / 0.5**order / (1.5 if order == worse else 1.1)
+    around = Surroundings(rows.joints, stands, Limits(*bounds))
+    every = judge_by_profile([replace(rows, t=rows.t + 0.5)], load_profile("ros-jtc"), around).findings
+    (one,) = [each for each in every if each.rule == "jtc-first-point"]
+    assert (one.kind, one.count) == (["velocity", "acceleration"][worse - 1], 2)
+    assert one.factor is None or one.value / one.limit == pytest.approx(1.5)
+
+
 @SIDES
 def test_a_joint_that_rests_in_its_dead_zone_is_no_fault(side: float) -> None:
     q = STILL.copy()

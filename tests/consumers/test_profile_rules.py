@@ -126,7 +126,9 @@ def test_durations_of_no_whole_microseconds_are_noted() -> None:
     rows = CLEAN["ur-passthrough"]
     t = rows.t.copy()
     t[10] += 4e-7
-    breach = only(judged(replace(rows, t=t), "ur-passthrough"))
+    judgement = judged(replace(rows, t=t), "ur-passthrough")
+    breach = only(judgement)
+    assert judgement.accepted
     assert (breach.rule, breach.severity, breach.row, breach.count) == (
         "passthrough-whole-microseconds",
         "warning",
@@ -140,11 +142,22 @@ def test_a_motion_longer_than_an_int32_of_microseconds() -> None:
     rows = CLEAN["ur-passthrough"]
     t = rows.t.copy()
     t[-1] = 2147.5
-    found = {breach.rule: breach for breach in judged(replace(rows, t=t), "ur-passthrough").findings}
-    breach = found["passthrough-longest"]
+    judgement = judged(replace(rows, t=t), "ur-passthrough")
+    assert not judgement.accepted
+    breach = {breach.rule: breach for breach in judgement.findings}["passthrough-longest"]
     assert (breach.severity, breach.time, breach.row, breach.limit) == ("error", 2147.5, 21, 2147)
     t[-1] = 2147.0
     assert judged(replace(rows, t=t), "ur-passthrough").findings == ()
+
+
+def test_errors_come_first_whenever_they_are() -> None:
+    rows = CLEAN["ur-passthrough"]
+    t = rows.t.copy()
+    t[5] += 4e-7
+    t[-1] = 2147.5
+    found = judged(replace(rows, t=t), "ur-passthrough").findings
+    assert [breach.severity for breach in found] == ["error", "warning"]
+    assert found[0].time > found[1].time
 
 
 def test_the_first_of_several_stamps_that_are_too_late_is_named_with_the_latest_as_value() -> None:
