@@ -77,6 +77,9 @@ WRONG = [  # settings, rate, message, place
     ),
     (["moves.0.duration=-3"], None, "expected a number above 0 s, got -3", "--set moves.0.duration=-3:1:1"),
     (["moves.0.speed=3"], None, "unknown key 'speed'", "--set moves.0.speed=3:1:1"),
+    (["moves.0.speed.x=3"], None, "unknown key 'speed'", "--set moves.0.speed.x=3:1:1"),
+    (["moves.0.to.0=3"], None, "unknown key '0'", "--set moves.0.to.0=3:1:1"),
+    (["moves.0.to.0.1=3", "moves.0.to.0=7"], None, "unknown key '0'", "--set moves.0.to.0=7:1:1"),
     (
         ["moves.0={planner: hold, duration: 1, durtion: 1}"],
         None,

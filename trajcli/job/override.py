@@ -73,18 +73,18 @@ class PatchedDocument(Document):
     """A document in which options have replaced parts, or added some.
 
     Attributes:
-        patches: What the options say, by path.
+        patches: What the options say, by what they replace or begin.
     """
 
-    patches: Mapping[_Steps, Document] = field(default_factory=dict)
+    patches: Mapping[tuple[str, ...], Document] = field(default_factory=dict)
 
     def place(self, path: Sequence[str | int], *, key: bool = False) -> Place:
         """Return where the deepest existing node on the path stands, in the file or in an option."""
-        steps = tuple(path)
+        steps = tuple(map(str, path))
         for depth in range(len(steps), 0, -1):
             patch = self.patches.get(steps[:depth])
             if patch is not None:
-                return patch.place(steps[depth:], key=key)
+                return patch.place(path[depth:], key=key)
         return super().place(path, key=key)
 
 
@@ -103,10 +103,14 @@ def overridden(document: Document, settings: Sequence[Setting]) -> Document:
 
 def _patched(document: Document, setting: Setting) -> PatchedDocument:
     patch = parse_document(setting.value, setting.option, any_root=True)
-    root, depth = _with(document.root, setting.path, patch.root, setting.option), len(setting.path)
+    path, steps = setting.path, tuple(map(str, setting.path))
+    root = _with(document.root, path, patch.root, setting.option)
     before = document.patches if isinstance(document, PatchedDocument) else {}
-    kept = {path: each for path, each in before.items() if path[:depth] != setting.path}
-    return PatchedDocument(document.file, document.lines, root, {**kept, setting.path: patch})
+    patches = {at: each for at, each in before.items() if at[: len(steps)] != steps}
+    for depth in range(1, len(steps) + 1):
+        if depth == len(steps) or document.node(path[:depth]) is None:
+            patches[steps[:depth]] = patch
+    return PatchedDocument(document.file, document.lines, root, patches)
 
 
 def _written_out(document: Document, setting: Setting) -> Document:
