@@ -201,13 +201,45 @@ def test_where_rows_are_jumped_to_the_time_of_the_first_one_is_no_matter(profile
 
 
 @SIDES
+@pytest.mark.parametrize("begins", [100.0, -100.02])
 @pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.2, True)])
-def test_stamps_of_few_digits_are_as_rough_as_they_are_large(share: float, broken: bool, side: float) -> None:
-    """At 100 s a ten millionth of it, of both stamps of an interval."""
+def test_stamps_of_few_digits_are_as_rough_as_they_are_large(
+    share: float, broken: bool, begins: float, side: float
+) -> None:
+    """At 100 s, or as long before an event, a ten millionth of it, of both stamps of an interval."""
     rough = replace(FRANKA.resolution, relative_time=1e-7)
-    t = 100.0 + FRANKA.t
+    t = begins + FRANKA.t
     t[10:] += side * share * 2 * 1e-7 * 100.0
     assert bool(found(replace(FRANKA, t=t, resolution=rough), "franka-fr3", "fr3-period")) == broken
+
+
+@SIDES
+@pytest.mark.parametrize(("beyond", "broken"), [(0.0, False), (1e-7, True)])
+def test_a_torque_just_at_its_limit_is_no_fault(beyond: float, broken: bool, side: float) -> None:
+    tau = np.zeros((21, 7))
+    tau[:, 4] = side * 12.0 * (1 + beyond)
+    over = found(replace(FRANKA, tau=tau), "franka-fr3", "fr3-torque")
+    assert [(each.joint, each.value, each.limit) for each in over] == (
+        [("joint_5", tau[0, 4], side * 12.0)] if broken else []
+    )
+
+
+@pytest.mark.parametrize(("value", "end"), [(-0.1, -0.1458), (-3.1, -3.0481)])
+def test_a_range_on_one_side_of_zero_has_two_ends(value: float, end: float) -> None:
+    q = STILL.copy()
+    q[:, 3] = value
+    (one,) = found(replace(FRANKA, q=q), "franka-fr3", "fr3-position")
+    assert (one.joint, one.value, one.limit, one.count) == ("joint_4", value, end, 21)
+
+
+@SIDES
+@pytest.mark.parametrize(("units", "broken"), [(1, False), (3, True)])
+def test_a_unit_of_the_last_decimal_is_no_motion(units: int, broken: bool, side: float) -> None:
+    """It may be there by rounding: a millionth in a millisecond, of which rest leaves 5000 / 6 millionths."""
+    rows = motion(rows=21, columns="q", decimals=6)
+    q = STILL.copy()
+    q[-1, 3] += side * units * 1e-6
+    assert bool(found(replace(rows, q=q), "franka-fr3", "fr3-rest-end")) == broken
 
 
 @pytest.mark.parametrize(("off", "noted"), [(0.5e-9, False), (5e-9, True)])
