@@ -213,6 +213,26 @@ def test_stamps_of_few_digits_are_as_rough_as_they_are_large(
     assert bool(found(replace(FRANKA, t=t, resolution=rough), "franka-fr3", "fr3-period")) == broken
 
 
+@pytest.mark.parametrize(("off", "broken"), [(0.0, False), (1e-5, True)])
+def test_stamps_since_1970_are_as_rough_as_float64_is_there(off: float, broken: bool) -> None:
+    """A quarter of a microsecond stands between two of them."""
+    t = 1.7e9 + FRANKA.t
+    t[10:] += off
+    assert bool(found(replace(FRANKA, t=t), "franka-fr3", "fr3-period")) == broken
+
+
+@pytest.mark.parametrize(("first", "step", "broken"), [(0.6, 0.8, True), (0.4, 0.2, False)])
+def test_stamps_are_counted_in_whole_nanoseconds_and_not_their_differences(
+    first: float, step: float, broken: bool
+) -> None:
+    """0.6 and 1.4 ns are both 1; 0.4 and 0.6 are 0 and 1."""
+    rows = motion(period=0.1, rows=21)
+    t = rows.t.copy()
+    t[7] += first * 1e-9
+    t[8] = t[7] + step * 1e-9
+    assert bool(found(replace(rows, t=t), "ros-jtc", "jtc-increasing-times")) == broken
+
+
 @SIDES
 @pytest.mark.parametrize(("beyond", "broken"), [(0.0, False), (1e-7, True)])
 def test_a_torque_just_at_its_limit_is_no_fault(beyond: float, broken: bool, side: float) -> None:
