@@ -322,6 +322,42 @@ def test_breaks_off_their_knots_cost_nothing_over_long_intervals(
     assert len(knots.nanoseconds) <= 16
 
 
+@pytest.mark.parametrize("stepping", [0, 1, 2])
+def test_a_knot_stands_behind_the_step_of_any_joint(stepping: int) -> None:
+    """The break is 0.4 ns behind a whole nanosecond, and the next one is behind the break."""
+    one = rising([0.0, 19.0000000004, 20.0], [1.0, -9.0], 2)
+    rows = np.zeros((3, 2, 3))
+    rows[:, :, stepping] = one.coefficients[:, :, 0]
+    curve = PiecewisePolynomial(one.breaks, rows)
+    assert 19_000_000_001 in knots_of(made_of(curve, ending(curve)), 2).nanoseconds
+
+
+def test_cubics_are_ten_times_nearer_than_quintics_must_be() -> None:
+    coefficients = np.zeros((7, 1, 1))
+    coefficients[0] = 0.1
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), coefficients)
+    knots = knots_of(made_of(curve, ending(curve)), 2)
+    joined = CubicHermiteSpline(knots.times, knots.position, knots.velocity)
+    t = np.linspace(0.0, 1.0, 20_001)
+    assert np.abs(joined(t) - curve.evaluate(t)).max() <= LARGEST_DEVIATION / 10
+    assert knots_of(made_of(curve, ending(curve))).deviation.position <= LARGEST_DEVIATION
+
+
+@pytest.mark.parametrize("breaks", [[0.0, 1.0, 1.000005], [0.0, 0.000005, 1.0]])
+def test_a_break_next_to_an_end_is_no_knot(breaks: list[float]) -> None:
+    curve = rising(breaks, [0.5, -0.5], 2)
+    assert (np.diff(knots_of(made_of(curve, ending(curve))).nanoseconds) >= 10_000).all()
+
+
+def test_steps_that_follow_each_other_soon_have_two_knots_each() -> None:
+    """Every 400 us: one a quarter of that before, and one behind, where a small step alone takes 200."""
+    curve = rising([4e-4 * k for k in range(9)], [(-1.0) ** k for k in range(8)], 2)
+    knots = knots_of(made_of(curve, ending(curve)))
+    steps = 400_000 * np.arange(1, 8)
+    assert knots.nanoseconds[1:-1].tolist() == (steps[:, None] + [-100_000, 100_000]).ravel().tolist()
+    assert knots.acceleration[1:-1, 0] == pytest.approx(np.repeat((-1.0) ** np.arange(8), 2)[1:-1], abs=1e-9)
+
+
 def test_cubics_cost_nothing_where_the_acceleration_steps_off_its_knot() -> None:
     """Of a step a that comes e before its knot a velocity e a is left, which a cubic carries 4 h / 27 far."""
     trajectory = made_of(curve := rising([0.0, 19.0000000004, 20.0], [1.0, -9.0], 2), ending(curve))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -112,6 +113,25 @@ def test_velocities_bound_the_way_of_an_interval() -> None:
     states = np.zeros(rows.shape[1])
     states[0::3] = np.linspace(0.0, 2.0, INTERVALS + 1)
     assert (rows @ states - sizes).max() == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_what_is_bounded_in_one_direction_alone_has_no_rows(side: int) -> None:
+    bounds = np.tile([-1.0, 2.0], (3, 1))
+    bounds[:2, side] = [-np.inf, np.inf][side]
+    rows, orders, sizes = moment_rows(bounds, INTERVALS)
+    assert set(orders) == {3}
+    assert np.isfinite(rows).all()
+    assert np.isfinite(sizes).all()
+
+
+def test_a_programme_that_is_not_solved_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    chain = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0]))
+    programme = ShareProgramme(chain.chain, 4, 3)
+    whole = ShareBox((0.3, 0.3), (0.4, 0.4))
+    assert programme.least_duration(whole, 0.9 * chain.duration, chain.duration) > 0.0
+    monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: SimpleNamespace(status=4))
+    assert programme.least_duration(whole, 0.9 * chain.duration, chain.duration) == 0.0
 
 
 def states_of(chain: FlownChain, programme: ShareProgramme) -> tuple[np.ndarray, np.ndarray]:

@@ -54,6 +54,19 @@ def test_a_row_is_met_where_a_joint_has_its_limit_of_acceleration(seed):
     assert JointConstraint(path, velocity, acceleration).bounds_sdd
 
 
+@pytest.mark.parametrize(("slope", "rests"), [(1e-15, True), (-1e-15, True), (1e-9, False), (-1e-9, False)])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_joint_that_rounding_alone_moves_has_no_acceleration_by_it(joint, slope, rests):
+    """The other joint goes from 0 to 1: a ten trillionth of that is what rounding leaves of rest."""
+    slopes = np.array([1.0, 1.0])
+    slopes[joint] = slope
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.stack([slopes, [0.0, 0.0]])[:, None])
+    bounds = np.tile([-1.0, 1.0], (2, 1))
+    wanted = np.where(slopes == slope, 0.0 if rests else slope, slopes)
+    rows = JointConstraint(path, bounds, bounds).rows(S, "right")
+    np.testing.assert_array_equal(rows.a, np.tile(np.append(wanted, -wanted), (S.size, 1)))
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_rows_at_a_corner_are_those_of_its_side(side):
     path = polyline([[0.0], [1.0], [-1.0]])

@@ -9,7 +9,7 @@ from product_of_rows import difference_jacobian, pose_of
 from tiers import few
 
 from trajcli.errors import InputError
-from trajcli.kinematics.calibration.identifiability import identifiability
+from trajcli.kinematics.calibration.identifiability import _reduced, identifiability
 from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
 from trajcli.kinematics.calibration.parameters import (
     ArmParameter,
@@ -46,6 +46,14 @@ def difference_rank(robot, q, parameters, part):
     assert values[rank - 1] > 1e-3
     assert (values[rank:] < 1e-6).all()
     return rank
+
+
+@pytest.mark.parametrize("mixed", [np.eye(2), np.eye(2)[::-1], [[0.6, 0.8], [-0.8, 0.6]]])
+def test_combinations_are_the_same_however_a_kernel_is_mixed(mixed) -> None:
+    """Parameters 2 and 4 are each in one combination alone, the first and the third with either of them."""
+    combinations = np.array([[0.75, 1.0, 0.0, 0.0], [-0.75, 0.0, 2.0, 1.0]])
+    found = _reduced(np.asarray(mixed) @ combinations)
+    np.testing.assert_allclose(found[np.argsort(found[:, 3])], combinations, atol=1e-12)
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])

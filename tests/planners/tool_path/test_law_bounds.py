@@ -64,6 +64,11 @@ def test_what_a_law_names_is_along_the_path() -> None:
     bounds, _ = law_bounds(spec, ToolLimits(**TOOL), PATHS["bent"], "line")
     assert (bounds.speed, bounds.acceleration, bounds.deceleration) == (0.3, 1.0, 0.5)
     assert bounds.by_order == (0.3, 0.5, TOOL["jerk"])
+    fast = LawSpec(shape="trapezoid", speed=0.6, acceleration=1.0)  # who names both rules the bend, too
+    assert law_bounds(fast, ToolLimits(**TOOL), PATHS["bent"], "line")[0].speed == 0.6
+    assert law_bounds(LawSpec(shape="trapezoid", speed=0.6), ToolLimits(**TOOL), PATHS["bent"], "line")[
+        0
+    ].speed == pytest.approx(math.sqrt(0.8 * 2.0 / 8.0))
     up = replace(bounds, acceleration=0.2)
     assert up.by_order == (0.3, 0.2, TOOL["jerk"])
     assert (
@@ -72,6 +77,31 @@ def test_what_a_law_names_is_along_the_path() -> None:
     )
     twice = bounds.with_each(up, lambda one, other: one + other)
     assert (twice.speed, twice.acceleration, twice.deceleration) == (0.6, 1.2, 1.0)
+
+
+@pytest.mark.parametrize(("longer", "possible"), [(0.0, True), (1e-4, True), (-1e-4, False)])
+def test_ramps_of_a_trapezoid_that_lasts_as_long_as_its_ramps_alone(longer: float, possible: bool) -> None:
+    """Up with 2 and down with 5 m/s^2, without a bound of the speed: in more time it cruises, in less it is none."""
+    bounds, length = PathBounds(math.inf, 2.0, 5.0, math.inf), 0.7
+    duration = math.sqrt(2 * length * (1 / 2.0 + 1 / 5.0)) * (1 + longer)
+    spec = LawSpec(acceleration=2.0, deceleration=5.0, duration=duration)
+    if not possible:
+        with pytest.raises(PlanningError):
+            LAWS["trapezoid"].segment(spec, length, bounds, duration)
+        return
+    law = LAWS["trapezoid"].segment(spec, length, bounds, duration).law
+    fastest = peaks(law)[2]
+    assert [fastest.low[0], fastest.high[0]] == pytest.approx([-5.0, 2.0], rel=1e-6)
+    assert law.duration == pytest.approx(duration, rel=1e-12)
+
+
+def test_a_trapezoid_slows_down_as_its_law_says_at_a_speed_of_its_own() -> None:
+    spec = LawSpec(speed=0.5, deceleration=1.5, duration=2.0)
+    law = LAWS["trapezoid"].segment(spec, 0.7, PathBounds(0.5, math.inf, 1.5, math.inf), 2.0).law
+    found = peaks(law)
+    assert found[1].high[0] == pytest.approx(0.5)
+    assert found[2].low[0] == pytest.approx(-1.5)
+    assert law.duration == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
