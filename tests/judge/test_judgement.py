@@ -83,6 +83,16 @@ def test_what_rounding_explains_is_nothing_where_a_consumer_joins_them_either() 
     assert as_joined(Judgement((explained,), "cubic", 2)).verdict == "satisfied"
 
 
+@pytest.mark.parametrize("rule", ["limit", "path"])
+def test_of_joined_rows_what_is_just_above_a_limit_is_nothing(rule: str) -> None:
+    """Certain or not: knots stand in whole nanoseconds. Of a limit of zero there is no share."""
+    near, far = finding(1 + 0.5e-5, rule=rule), finding(1 + 2e-5, rule=rule)
+    rounded = finding(rule=rule, certainty="within rounding")
+    nothing = finding(limit=0.0, rule=rule, certainty="within rounding")
+    found = as_joined(Judgement((near, rounded, far, nothing), "cubic", 2)).findings
+    assert found == (far, nothing)
+
+
 @pytest.mark.parametrize("rule", ["continuity", "derivative", "time", "state", "franka-jerk"])
 @pytest.mark.parametrize("value", [0.5, 1 + 1e-9, 2.0])
 def test_of_joined_rows_everything_but_limits_is_judged_as_of_any_others(rule: str, value: float) -> None:

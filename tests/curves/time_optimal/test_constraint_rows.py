@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hermite_curves import hermite_pieces
 from topp_paths import polyline, random_bounds, spline
 
 from trajcli.curves.approach import ApproachLimits
@@ -181,6 +182,15 @@ def test_a_path_is_at_rest_where_its_derivative_vanishes(at_end, still):
         mirrored = np.array([[[1.0, 0.5]], [[-2.0, -1.0 - (0.0 if still else 1e-6)]], [[1.0, 0.5]]])
         path = PiecewisePolynomial(np.array([0.0, 1.0]), mirrored)
     assert is_at_rest(path) == ((not at_end) and still, at_end and still)
+
+
+@pytest.mark.parametrize("rests", range(3))
+def test_of_many_pieces_the_first_and_the_last_end_count(rests):
+    """Cubics of which one end or both ends are at rest, and all others move."""
+    rates = np.array([[0.0, 1.0, 2.0, 3.0], [3.0, 0.0, 0.0, 2.0], [3.0, 2.0, 1.0, 0.0]])[rests]
+    values = np.stack([np.cumsum(rates), rates])[:, :, None]
+    path = hermite_pieces(np.arange(4.0), values)
+    assert is_at_rest(path) == (rests == 0, rests == 2)
 
 
 def test_a_joint_that_hardly_moves_has_no_corner_by_rounding():

@@ -32,9 +32,12 @@ def plan(joints: int) -> Plan:
     return plan_job(random_jobs.loaded(job | {"moves": [move]}))
 
 
-def found(folder: Path, t: np.ndarray, joints: int = 7, columns: int = 7) -> dict[str, list[float | None]]:
-    """Return the rates by consumer that rows on straight lines between the ends of a plan may be at."""
+def found(
+    folder: Path, t: np.ndarray, joints: int = 7, columns: int = 7, beside: tuple[float, float] = (0.0, 0.0)
+) -> dict[str, list[float | None]]:
+    """Return the rates by consumer that rows on straight lines between the ends of a plan, or beside them, may be at."""
     rows = np.column_stack([t, *[0.1 * t / t[-1]] * columns])
+    rows[[0, -1], -1] += beside
     names = ",".join(["t", *(f"q{number + 1}" for number in range(columns))])
     np.savetxt(folder / "rows.csv", rows, "%.9f", ",", header=names, comments="")
     rates = dict[str, list[float | None]]()
@@ -56,6 +59,18 @@ def test_consumers_that_take_any_rate_are_tried_at_that_of_the_rows_too(
     assert "ros-jtc" in rates
     for profile, tried in rates.items():
         assert tried == ([None] if profile in FRANKA or rate == 10.0 else [None, rate])
+
+
+@pytest.mark.parametrize("last", [0.001, 0.0399])
+def test_the_last_row_at_any_time_is_no_matter_to_the_rate(last: float, tmp_path: Path) -> None:
+    rates = found(tmp_path, np.append(np.arange(16) / 25, 0.6 + last))
+    assert rates["ros-jtc"] == [None, 25.0]
+
+
+@pytest.mark.parametrize("beside", [(1e-8, 0.0), (0.0, 1e-8), (0.0, 0.0)])
+def test_rows_that_begin_or_end_elsewhere_are_for_nobody(beside: tuple[float, float], tmp_path: Path) -> None:
+    """By more than half a unit of their last decimal, of one joint."""
+    assert bool(found(tmp_path, np.linspace(0.0, 0.6, 7), beside=beside)) == (not any(beside))
 
 
 def test_rows_at_no_rate_are_tried_once(tmp_path: Path) -> None:

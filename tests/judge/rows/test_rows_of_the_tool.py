@@ -83,6 +83,17 @@ def test_the_tool_twice_as_fast_is_over_its_limits(columns: str, tmp_path: Path)
     assert found.verdict == "exceeded"
 
 
+@pytest.mark.parametrize("factor", [1 + 1e-4, 1 - 1e-4])
+def test_distances_of_a_file_that_lasts_otherwise_than_the_plan_are_of_unknown_moves(
+    factor: float, tmp_path: Path
+) -> None:
+    plan, file = planned("[t, path]"), tmp_path / "rows.csv"
+    names, rows = written(plan, file)
+    rows[:, names.index("t")] *= factor
+    with pytest.raises(InputError, match="which moves its distances s are of"):
+        judged(plan, names, rows, file)
+
+
 def test_a_tool_beside_its_line_is_found_without_joints(tmp_path: Path) -> None:
     plan, file = planned("[t, pose, move]"), tmp_path / "rows.csv"
     names, rows = written(plan, file)
