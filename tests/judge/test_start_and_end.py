@@ -7,15 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_rows import bare_robot, part
+from recorded_rows import bare_robot, part, rows_of
+from recorded_rows import judged as judged_by
 
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import ToolLimits, unlimited
+from trajcli.kinematics.robot import Payload, ToolLimits, unlimited
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import plan_job
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
@@ -377,3 +379,75 @@ def test_all_joints_that_are_elsewhere_are_counted(name: str, by: float, row: in
     both = moved(moved(motion(), name, row, 0, by), name, row, 2, -2 * by)
     (found,) = states_of(both)
     assert (found.joint, found.count) == ("j3", 2)
+
+
+@pytest.mark.parametrize("same", [(0, 0), (0, 1), (1, 0)])
+def test_a_tool_carries_one_thing_where_neither_it_nor_its_load_changes(same: tuple[int, int]) -> None:
+    loads = [Payload(1.0, np.zeros(3), np.eye(3)) for _ in range(2)]
+    first = replace(bare_robot(unlimited(2)), payload=loads[0], tool_load=loads[0])
+    second = replace(first, payload=loads[same[0]], tool_load=loads[same[1]])
+    assert Requirements(first, by_move={1: second}).carries_one(0, 1) == (same == (0, 0))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_two_moves_that_begin_to_brake_alike_the_one_nearer_to_its_end_is_looser(order: int) -> None:
+    pairs = [np.array([[2.0, offset]]) for offset in (0.3, 0.1)][::order]
+    position = np.array([[-9.0, 9.0]])
+    limits = [replace(unlimited(1), position=position, velocity_by_position=pair) for pair in pairs]
+    robots = list(map(bare_robot, limits))
+    between = Requirements(robots[0], by_move={1: robots[1]}).robot_between(0, 1)
+    np.testing.assert_array_equal(between.limits.velocity_by_position, [[2.0, 0.1]])
+
+
+def waving(joints: int = 2) -> RecordedMotion:
+    """Return 601 rows at 100 Hz of sin t and its derivatives, of which each joint is a little later."""
+    t = 0.01 * np.arange(601)
+    x = t[:, None] + 0.1 * np.arange(joints)
+    off = np.full(joints, 1e-12)
+    states = np.sin(x), np.cos(x), -np.sin(x)
+    return RecordedMotion(t, *states, None, None, None, None, Resolution(0.0, off, off, off), "rows")
+
+
+@pytest.mark.parametrize("name", ["q", "qd", "qdd"])
+def test_a_number_that_is_none_is_refused_wherever_it_stands(name: str) -> None:
+    rows = waving()
+    getattr(rows, name)[500, 1] = np.nan
+    with pytest.raises(InputError, match="row 501 has nan for joint 2"):
+        judged_by(rows, unlimited(2), blocks=300)
+
+
+@pytest.mark.parametrize("planned", [False, True])
+def test_a_row_that_is_missing_is_told_but_of_a_plan(planned: bool) -> None:
+    whole = waving()
+    kept = np.arange(601) != 300
+    rows = replace(whole, **{name: getattr(whole, name)[kept] for name in ("t", "q", "qd", "qdd")})
+    found = [each for each in judged_by(rows, unlimited(2), planned=planned).findings if each.rule == "time"]
+    assert [(each.row, each.severity) for each in found] == ([] if planned else [(301, "warning")])
+
+
+def test_wrong_velocities_of_one_joint_hide_no_wrong_accelerations_of_another() -> None:
+    rows = waving(3)
+    rows.qd[:, 0] *= 1.5
+    rows.qdd[:, 2] *= 1.5
+    found = {
+        (each.joint, each.quantity)
+        for each in judged_by(rows, unlimited(3)).findings
+        if each.kind == "derivative"
+    }
+    assert found == {("j1", "velocity"), ("j3", "acceleration")}
+
+
+@pytest.mark.parametrize("blocks", [20, 257])
+def test_what_changes_of_the_jerk_explain_is_the_same_in_blocks(blocks: int) -> None:
+    """300 of them between 901 dense rows: on both sides of a piece two others tell of one, beside a block's end too."""
+    rng = np.random.default_rng(1)
+    breaks = np.concatenate([[0.0], np.sort(rng.uniform(0.0, 9.0, 300)), [9.0]])
+    rows, state = np.zeros((4, 301, 1)), np.zeros(3)
+    for k, (length, jerk) in enumerate(zip(np.diff(breaks), rng.choice([-1.0, 1.0], 301), strict=True)):
+        rows[:, k, 0] = [jerk / 6, state[2] / 2, state[1], state[0]]
+        state = np.array([np.polyval(np.polyder(rows[:, k, 0], order), length) for order in range(3)])
+    curve = PiecewisePolynomial(breaks, rows)
+    limits = replace(unlimited(1), acceleration=0.9 * np.abs(curve.piece_ends(2)).max() * np.array([[-1, 1]]))
+    whole = judged_by(rows_of(curve, 0.01, 2), limits)
+    assert whole.findings[0].count > 10
+    assert judged_by(rows_of(curve, 0.01, 2), limits, blocks=blocks).findings == whole.findings
