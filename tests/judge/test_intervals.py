@@ -180,3 +180,12 @@ def test_a_law_that_changes_once_between_dense_rows_is_explained(order: int) -> 
         misses.append((miss, explained))
     worst, allowed = max(misses)
     assert allowed <= (4 if order else 12) * worst
+
+
+def test_a_change_of_law_explains_nothing_between_rows_that_are_further_apart_than_a_controllers() -> None:
+    """At 100 Hz and faster rows are taken one by one."""
+    lengths = np.array([0.005, 0.01, 0.0101, 0.02, 0.05, 0.01])
+    window = window_of(0, t=np.append(0.0, np.cumsum(lengths)), lengths=lengths)
+    pieces = np.arange(lengths.size)
+    explained = explained_by_law(window, pieces, np.zeros_like(pieces), 2, 2)
+    assert np.isfinite(explained).tolist() == [True, True, False, False, False, True]
