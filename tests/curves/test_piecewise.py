@@ -155,3 +155,14 @@ def test_ends_of_pieces_are_what_either_side_of_a_break_says():
         begins, ends = curve.piece_ends(order)
         np.testing.assert_allclose(begins, curve.evaluate(curve.breaks[:-1], order, side="right"), rtol=1e-12)
         np.testing.assert_allclose(ends, curve.evaluate(curve.breaks[1:], order, side="left"), rtol=1e-9)
+
+
+@pytest.mark.parametrize("count", [7, 8, 9, 13])
+def test_many_times_on_many_pieces_have_a_row_each(count, monkeypatch):
+    """Four at a time, the last of which stand alone where there is one more."""
+    monkeypatch.setattr("trajcli.curves.piecewise._ROWS", 4)
+    rows = np.random.default_rng(count).normal(size=(3, 6, 2))
+    curve = PiecewisePolynomial(np.arange(7.0), rows)
+    t = np.linspace(0.1, 5.9, count)
+    wanted = [[np.polyval(rows[:, int(x), joint], x - int(x)) for joint in range(2)] for x in t]
+    np.testing.assert_allclose(curve.evaluate(t), wanted, rtol=1e-12, atol=1e-12)
