@@ -304,7 +304,7 @@ def test_a_quaternion_of_another_length_is_none(row: int, length: float) -> None
     assert found.value == pytest.approx(0.1, rel=1e-6)
 
 
-@pytest.mark.parametrize("angle", [1e-6, -1e-6, 3.0, np.pi])
+@pytest.mark.parametrize("angle", [4e-9, 1e-6, -1e-6, 3.0, np.pi])
 def test_a_turned_quaternion_is_found_by_how_much(angle: float) -> None:
     q, qd, values = true_columns()
     half = (q[50, 0] + angle) / 2

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from planned_examples import planned_with_output
 from two_moves import TWO_MOVES
 
+from trajcli.columns import parse_column
 from trajcli.errors import PlanningError
+from trajcli.judge.rows import tool_rows
+from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
 from trajcli.judge.rows.tool_rows import joints_found_back
+from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.recorded.column_roles import NamedFile
+from trajcli.streams.row_sources import ArrayRows, unplaced
 
 TOOLS = """
 version: 1
@@ -124,3 +131,40 @@ def test_a_pose_that_the_arm_misses_by_more_than_rounding_is_refused(sign: int, 
                 joints_found_back(source, plan.loaded.robot_of_rows, plan)
         else:
             assert joints_found_back(source, plan.loaded.robot_of_rows, plan) is not None
+
+
+def test_a_wrong_stamp_takes_no_row_out_of_its_move() -> None:
+    """Of two moves in twice their time one row each has a stamp far behind: it is at the end of its move at most."""
+    spans = [SimpleNamespace(index=k, start=1.0 * k, end=k + 1.0, duration=1.0) for k in range(2)]
+    plan = SimpleNamespace(trajectory=SimpleNamespace(duration=2.0, spans=spans))
+    since, owner = 0.2 * np.arange(21), np.repeat([0, 1], [10, 11])
+    at, faster = tool_rows._in_plan(since, owner, plan)  # type: ignore[arg-type]
+    np.testing.assert_allclose(at, since / 2, atol=1e-12)
+    np.testing.assert_allclose(faster, 0.5, atol=1e-12)
+    since[[4, 15]] += 30.0
+    wrong, _ = tool_rows._in_plan(since, owner, plan)  # type: ignore[arg-type]
+    np.testing.assert_allclose(wrong[[4, 15]], [1.0, 2.0], atol=1e-12)
+    np.testing.assert_allclose(np.delete(wrong, [4, 15]), np.delete(at, [4, 15]), atol=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("duration", [1.0, 20.0, 400.0])
+@pytest.mark.parametrize("decimals", [6, 8])
+def test_what_rounding_of_velocities_adds_up_to_is_within_the_decimals_of_joints(
+    decimals: int, duration: float, sign: int
+) -> None:
+    """A slide goes steadily, by nearly half a unit of the last decimal faster than it is written."""
+    slide = Joint("turn", "revolute", a=0.5), Joint("slide", "prismatic")
+    arm = Robot("slide", slide, unlimited(2), "standard", np.eye(4), np.eye(4))
+    true = 0.1 + sign * 0.49 * 10.0**-decimals
+    names = ("t", "vx", "vy", "vz", "wx", "wy", "wz")
+    values = np.zeros((11, 7))
+    values[:, 0], values[:, 3] = np.linspace(0.0, duration, 11), np.round(true, decimals)
+    written = np.full(7, decimals)
+    named = NamedFile("rows.csv", names, unplaced)
+    rows = ArrayRows("csv", named, values, written, np.zeros(7), si=True)
+    of_tool = tool_rows._ToolRows(rows, tuple(map(parse_column, names)), values)
+    found = tool_rows._of_twists(of_tool, ArmsOfMoves(arm, []), None, np.zeros(2))
+    off = np.abs(found.states[0][:, 1] - true * values[:, 0]).max()
+    assert off == pytest.approx(0.49 * 10.0**-decimals * duration, rel=1e-2)
+    assert off <= 0.5 * 10.0 ** -found.decimals[0]
