@@ -358,6 +358,28 @@ def test_steps_that_follow_each_other_soon_have_two_knots_each() -> None:
     assert knots.acceleration[1:-1, 0] == pytest.approx(np.repeat((-1.0) ** np.arange(8), 2)[1:-1], abs=1e-9)
 
 
+@pytest.mark.parametrize("apart", [40_000, 100_000, 600_000])
+def test_steps_near_to_each_other_between_long_pieces_have_two_knots_each(apart: int) -> None:
+    """The first has its neighbour behind it, the last before it: a quarter of the way to that is left to either side."""
+    curve = rising([0.0, 1.0, 1.0 + 1e-9 * apart, 2.5], [1.0, -1.0, 1.0], 2)
+    knots = knots_of(made_of(curve, ending(curve)))
+    steps = 1_000_000_000 + apart * np.arange(2)
+    half = min(apart // 4, 200_000)
+    assert knots.nanoseconds[1:-1].tolist() == (steps[:, None] + [-half, half]).ravel().tolist()
+    assert knots.acceleration[1:-1, 0] == pytest.approx([1.0, -1.0, -1.0, 1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("units", [-3, -1, 0, 1, 3])
+def test_the_acceleration_of_a_knot_is_that_behind_a_break_that_rounding_moves(units: int) -> None:
+    """A break a few units in the last place before or behind a whole nanosecond is there."""
+    curve = rising([0.0, 0.3 + units * float(np.spacing(0.3)), 1.0], [1.0, -1.0], 2)
+    trajectory = made_of(curve, ending(curve))
+    for knots in (knots_of(trajectory, 2), knots_at(trajectory, np.array([0.0, 0.3, 1.0]))):
+        at = np.searchsorted(knots.nanoseconds, 300_000_000)
+        assert knots.nanoseconds[at] == 300_000_000
+        assert knots.acceleration[at, 0] == pytest.approx(-1.0, abs=1e-9)
+
+
 def test_cubics_cost_nothing_where_the_acceleration_steps_off_its_knot() -> None:
     """Of a step a that comes e before its knot a velocity e a is left, which a cubic carries 4 h / 27 far."""
     trajectory = made_of(curve := rising([0.0, 19.0000000004, 20.0], [1.0, -9.0], 2), ending(curve))

@@ -141,6 +141,23 @@ def test_what_comes_not_near_enough_to_its_values_is_not_proven(monkeypatch: pyt
     assert tool(moving.trajectory.curve, moving.motion.law).bounds == (None, None)
 
 
+def test_what_is_proven_is_within_two_thousandths_of_the_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same turn in one piece, which is halved twice: a tolerance that is large enough for its remainder is met."""
+    rows = np.zeros((4, 1, 6))
+    rows[-1, 0], rows[0, 0, 0], rows[1, 0, 0] = Q, -1.0, 1.5
+    joints = PiecewisePolynomial(np.array([0.0, 1.0]), rows)
+    resting = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[REST]]]))
+    monkeypatch.setattr(path_bound, "_HALVINGS", 2)
+    proven = []
+    for tolerance in 10.0 ** np.arange(-12, 4):
+        bounds = tool(joints, resting, tolerances=(tolerance, tolerance)).bounds
+        proven.append([bound is not None for bound in bounds])
+        for bound in filter(None, bounds):
+            assert bound.value <= bound.upper_bound <= bound.value + 2.1e-3 * tolerance
+    assert not np.any(proven[0])
+    assert np.all(proven[-1])
+
+
 @pytest.mark.parametrize("pieces", [2, 4])
 def test_a_law_that_lasts_shorter_or_longer_proves_nothing(pieces: int) -> None:
     assert tool(standing(), law()).bounds != (None, None)
@@ -148,6 +165,31 @@ def test_a_law_that_lasts_shorter_or_longer_proves_nothing(pieces: int) -> None:
     assert each.motion is not None
     beside = replace(each, motion=replace(each.motion, law=law(pieces=pieces)))
     assert beside.bounds == (None, None)
+
+
+@pytest.mark.parametrize(("end", "law_end"), [(2.999, 3.0), (2.5, 2.5), (3.0, 2.999)])
+def test_a_move_that_ends_off_the_breaks_of_its_joints_or_of_its_law_is_not_proven(
+    end: float, law_end: float
+) -> None:
+    """By a millisecond of three seconds, or in the middle of the last piece of the joints."""
+    each = tool(standing(), law())
+    assert each.motion is not None
+    shorter = PiecewisePolynomial(np.array([0.0, 1.0, 2.0, law_end]), law().coefficients)
+    moved = replace(each, span=replace(each.span, end=end), motion=replace(each.motion, law=shorter))
+    assert moved.bounds == (None, None)
+
+
+@pytest.mark.parametrize("piece", [0, 1, 2])
+@pytest.mark.parametrize("short", [1e-3, 1e-6])
+def test_a_bump_in_a_short_piece_is_found(piece: int, short: float) -> None:
+    """Of three seconds the law goes beside its place for a millisecond, or for a thousandth of one."""
+    lengths = np.ones(3)
+    lengths[piece] = short
+    rows = law().coefficients.copy()
+    rows[:, piece, 0] += 1.5 * TOLERANCE * BUMP / short ** np.arange(9, -1, -1.0)
+    along = PiecewisePolynomial(np.append(0.0, np.cumsum(lengths)), rows)
+    joints = PiecewisePolynomial(along.breaks[[0, -1]], Q[None, None])
+    assert most(tool(joints, along))[0] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
 
 
 @pytest.mark.parametrize("times", [1.5, 0.9])
