@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from motions import between, limits, state, trajectory
 
-from trajcli.checks.verify import verify
+from trajcli.checks.verify import longest_factor, verify
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.findings import Finding
 from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
+from trajcli.limits.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import Promise, Trajectory
 
 OF_THE_TOOL = replace(limits(), tcp=ToolLimits(speed=1.0, angular_acceleration=2.0))
@@ -81,3 +83,41 @@ def test_what_joins_the_acceleration_is_advised_against_jerk_alone(kind: str) ->
     if kind == "velocity":
         assert hints["velocity"] != hints["acceleration_jump"]
         assert "longer" in hints["velocity"]
+
+
+@pytest.mark.parametrize("slow", [0, 1, 2])
+def test_what_each_move_promises_decides_what_would_help_it(slow: int) -> None:
+    """All three are too fast; one of them has been slowed down already, so that more time is no answer for it."""
+    whole = trajectory(*(between([k], [k + 1.0], duration=1.0) for k in (0.0, 1.0, 2.0)))
+    promises = [Promise(over_limit="slow" if k == slow else None) for k in range(3)]
+    found = verify(whole, [limits(velocity=1.0)] * 3, promises).findings
+    assert [each.move for each in found if each.kind == "velocity"] == [0, 1, 2]
+    for each in found:
+        assert ("does not help" in (each.hint or "")) == (each.move == slow)
+        assert ("it must last 1.875 times longer" in (each.hint or "")) == (each.move != slow)
+
+
+@pytest.mark.parametrize(
+    ("method", "slack"), [("exact", LIMIT_RELATIVE), ("bounded", TOOL_RELATIVE), ("sampled", TOOL_RELATIVE)]
+)
+def test_a_factor_is_not_above_what_is_enough_and_is_enough(method: str, slack: float) -> None:
+    """A third power of it, as of a jerk, is within what the limits let go for rounding."""
+    factor = 2.0 * (1 + slack / 5)
+    findings = [
+        Finding(kind="jerk", joint="a", value=8.0, limit=1.0, factor=factor, method=method, message="fast")  # type: ignore[arg-type]
+    ]
+    found = longest_factor(findings)
+    assert found is not None
+    assert found <= 2.0
+    assert (factor / found) ** 3 <= 1 + slack
+
+
+@pytest.mark.parametrize("limited", [0, 1, 2])
+def test_limits_that_one_move_alone_has_are_judged_in_it(limited: int) -> None:
+    """In a second from rest to rest by 1 rad a quintic goes 1.875 rad/s in its middle; sqrt(2 d x) - o there is below 1."""
+    whole = trajectory(*(between([k], [1.0 - k], duration=1.0) for k in (0.0, 1.0, 0.0)))
+    near = replace(limits(position=1.5), velocity_by_position=np.array([[0.5, 0.0]]))
+    bounds = [near if k == limited else limits(position=1.5) for k in range(3)]
+    verdict = verify(whole, bounds)
+    assert {(each.kind, each.move) for each in verdict.findings} == {("velocity_by_position", limited)}
+    assert [bool(used) for used in verdict.by_position] == [k == limited for k in range(3)]

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from planted_faults import HOME, judged, motion, with_value
 
+from trajcli.consumers.judgement import judge_by_profile, judgement_of, load_profile
+from trajcli.consumers.profile import profile_names
 from trajcli.consumers.rule_check import Surroundings
+from trajcli.findings import Finding
 from trajcli.streams.recorded_motion import RecordedMotion
 
 JTC = motion(period=0.1, rows=21)
 STILL = np.tile(HOME[7], (21, 1))
 FRANKA = replace(motion(rows=21), q=STILL, qd=np.zeros_like(STILL), qdd=np.zeros_like(STILL))
 SIDES = pytest.mark.parametrize("side", [-1.0, 1.0])
+
+
+def part(rows: RecordedMotion, of: slice) -> RecordedMotion:
+    """Return some rows of a motion."""
+    columns = {name: getattr(rows, name) for name in ("t", "q", "qd", "qdd", "tau", "move")}
+    cut = {name: None if values is None else values[of] for name, values in columns.items()}
+    return replace(rows, first_row=rows.first_row + (of.start or 0), **cut)
 
 
 def rules(rows: RecordedMotion, profile: str, stands: np.ndarray | None = None) -> set[str]:
@@ -153,3 +164,50 @@ def test_the_coarsest_joint_is_named(joint: int) -> None:
     coarse = replace(FRANKA, resolution=replace(FRANKA.resolution, q=half))
     found = judged(coarse, "franka-fr3", Surroundings(coarse.joints, STILL[0])).findings
     assert [each.joint for each in found if each.rule == "fr3-decimals"] == [f"joint_{joint + 1}"]
+
+
+@pytest.mark.parametrize("profile", profile_names())
+def test_blocks_without_rows_change_nothing(profile: str) -> None:
+    """A file may begin, go on and end with one: what is found of its rows, wrong in the first, is found all the same."""
+    rows = with_value(with_value(JTC, "q", 0, 1, 9.0), "qd", -1, 1, 5.0)
+    nothing = part(rows, slice(0, 0))
+    around = Surroundings(rows.joints, rows.q[0])
+    whole, *cut = (
+        [
+            (each.rule, each.time, each.value)
+            for each in judge_by_profile(blocks, load_profile(profile), around).findings
+        ]
+        for blocks in (
+            [part(rows, slice(0, 9)), part(rows, slice(9, None))],
+            [nothing, part(rows, slice(0, 9)), nothing, part(rows, slice(9, None)), nothing],
+        )
+    )
+    assert whole
+    assert cut == [whole]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_findings_are_told_errors_first_and_by_their_times(order: int) -> None:
+    """Whichever rule stands first: it counts where two are broken at one time alone."""
+    told = [
+        ("a", "error", 1.0),
+        ("b", "error", 1.0),
+        ("b", "error", 3.0),
+        ("a", "error", 4.0),
+        ("a", "warning", 0.5),
+    ]
+    findings = [
+        Finding(rule=rule, severity=severity, kind="rule", value=1.0, limit=0.5, time=time, message="")
+        for rule, severity, time in told[::order]
+    ]
+    checks = [
+        SimpleNamespace(
+            findings=lambda rule=rule: [each for each in findings if each.rule == rule],
+            finish=lambda: None,
+            unjudged=None,
+        )
+        for rule in "ba"
+    ]
+    profile = SimpleNamespace(rules=[SimpleNamespace(id=rule) for rule in "ab"])
+    found = judgement_of(profile, checks).findings  # type: ignore[arg-type]
+    assert [(each.rule, each.severity, each.time) for each in found] == told
