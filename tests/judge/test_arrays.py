@@ -7,7 +7,9 @@ import pytest
 from counted_calls import calls_of
 
 import trajcli
-from trajcli.kinematics.robot import Limits
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.kinematics.robot import Joint, Limits, Robot
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 T = 0.02 * np.arange(50)
 Q = np.outer(np.sin(T), np.full(7, 0.3)) + np.array([0, 0, 0, -1.5, 0, 1.5, 0])
@@ -58,6 +60,29 @@ def test_degrees_of_joints_without_ranges_are_hinted_at_once(times: float, looks
     found = trajcli.check(2.0 * share, q, limits={"velocity": 0.9 * 15 * 1.875 / 2.0})
     assert found.verdict == "exceeded"
     assert sum("degrees" in (each.hint or "") for each in found.findings) == looks
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("block", [0, 1, 2])
+def test_degrees_are_hinted_at_wherever_and_to_whichever_side_joints_go(block: int, side: float) -> None:
+    """There and back by 300 in one of three blocks of rows, and 1 in the others; a range that is passed is told first."""
+    share = np.linspace(0.0, 1.0, 300, endpoint=False)
+    one = np.sin(np.pi * share) ** 4
+    q = side * np.concatenate([(300.0 if k == block else 1.0) * one for k in range(3)])[:, None]
+    t, free, exact = np.arange(900) * 0.01, np.array([[-np.inf, np.inf]]), np.zeros(1)
+    rows = [slice(300 * k, 300 * k + 300) for k in range(3)]
+    blocks = [
+        RecordedMotion(t[of], q[of], *(None,) * 6, Resolution(0.0, exact, exact, exact), "rows", 1 + of.start)
+        for of in rows
+    ]
+    velocity, position = np.array([[-5.0, 5.0]]), np.array([[-100.0, 100.0]])
+    for limits, kind in (
+        (Limits(free, velocity, free, free), "velocity"),
+        (Limits(position, velocity, free, free), "position"),
+    ):
+        robot = Robot("one", (Joint("j1"),), limits, None, np.eye(4), np.eye(4))
+        found = judge_motion(lambda: blocks, Requirements(robot)).findings
+        assert [each.kind for each in found if "degrees" in (each.hint or "")] == [kind]
 
 
 def test_a_doubled_time_is_a_finding() -> None:
