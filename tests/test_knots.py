@@ -390,12 +390,23 @@ def test_cubics_cost_nothing_where_the_acceleration_steps_off_its_knot() -> None
     assert len(knots.nanoseconds) <= 16
 
 
-def test_what_knots_cannot_cure_has_no_more_of_them() -> None:
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_knots_cannot_cure_has_no_more_of_them(side: float) -> None:
     """Positions of 10^8 are rounded by 1e-8; a velocity that changes in 3 ns is there in no row."""
-    far = rising([0.0, 0.1, 100.0, 100.1], [1e7, 0.0, -1e7], 2)
+    far = rising([0.0, 0.1, 100.0, 100.1], [side * 1e7, 0.0, -side * 1e7], 2)
     assert len(knots_of(made_of(far, ending(far)), 2).nanoseconds) == 4
     ramp = rising([0.0, 0.1, 0.100000003, 2.0], [0.0, 1e8, 0.0], 2)
     assert len(knots_of(made_of(ramp, ending(ramp)), 2).nanoseconds) <= 70
+
+
+def test_knots_are_a_microsecond_apart_however_much_is_missed() -> None:
+    """In 20 us a motion that no microsecond is short enough for."""
+    coefficients = np.zeros((7, 1, 1))
+    coefficients[0] = 1e36
+    curve = PiecewisePolynomial(np.array([0.0, 2e-5]), coefficients)
+    knots = knots_of(made_of(curve, ending(curve)))
+    assert knots.deviation.position > LARGEST_DEVIATION
+    assert np.diff(knots.nanoseconds).tolist() == [1000] * 20
 
 
 def test_an_end_in_motion_keeps_its_velocity() -> None:

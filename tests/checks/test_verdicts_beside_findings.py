@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from motions import between, limits, state, trajectory
 
-from trajcli.checks.verify import longest_factor, verify
+from trajcli.checks.verify import _sampled, longest_factor, verify
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
@@ -124,3 +125,11 @@ def test_limits_that_one_move_alone_has_are_judged_in_it(limited: int) -> None:
     verdict = verify(whole, bounds)
     assert {(each.kind, each.move) for each in verdict.findings} == {("velocity_by_position", limited)}
     assert [bool(used) for used in verdict.by_position] == [k == limited for k in range(3)]
+
+
+def test_a_move_of_several_parts_is_named_once() -> None:
+    """What is judged on rows alone in the same moves is said of them together."""
+    told = [(0, "distance"), (0, "branch"), (0, "distance"), (2, "branch"), (2, "distance"), (3, "branch")]
+    tools = [SimpleNamespace(span=SimpleNamespace(index=move), sampled=(what,)) for move, what in told]
+    assert _sampled(tools) == (("distance", (0, 2)), ("branch", (0, 2, 3)))  # type: ignore[arg-type]
+    assert _sampled(tools[:-1]) == (("distance and branch", (0, 2)),)  # type: ignore[arg-type]
