@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -20,7 +21,6 @@ from docs.svg_comparison import is_current, same_picture
 from trajcli.cli.app import app
 from trajcli.job.read import job_from_text
 from trajcli.job.robot import read_sheet
-from trajcli.job.schema import schema_of
 from trajcli.planners import PLANNERS
 from trajcli.planning.plan import plan_job
 
@@ -147,7 +147,7 @@ def table_fields(text: str) -> set[str]:
     return set(re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE))
 
 
-SCHEMA = schema_of("job")
+SCHEMA = json.loads((ROOT / "schemas/job.schema.json").read_text(encoding="utf-8"))
 SHARED = {"planner", "limits", "when_over_limit", "label", "zone", "at", "approach", "retreat"}
 """Fields of every move."""
 MOVES = {
