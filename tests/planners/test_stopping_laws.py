@@ -6,6 +6,7 @@ import itertools
 import json
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.zone import ZoneAround
+from trajcli.planners.flying_by import motion_search
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import flown_parts
@@ -66,6 +68,17 @@ def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace
         for part in parts:
             times = np.linspace(0, part.curve.end, 2000)
             assert np.abs(part.curve.evaluate(times, order)).max() <= limit * (1 + 1e-8)
+
+
+@pytest.mark.parametrize(("findings", "times"), [([SimpleNamespace(kind="zone", factor=None)], 1), ([], 2)])
+def test_laws_beside_a_zone_that_has_to_change_are_not_made_better(findings, times, monkeypatch):
+    made = []
+    monkeypatch.setattr(motion_search, "flown_parts", lambda *given: made.append(0) or flown_parts(*given))
+    monkeypatch.setattr(
+        motion_search, "findings_of", lambda chain, number, part: findings if number == 1 else []
+    )
+    motion_search.MotionSearch({}, by_order=True).fastest(chain_with("lines")[0])
+    assert len(made) == times
 
 
 def test_a_state_comes_from_that_of_a_faster_law_to_that_of_the_one_that_stops():

@@ -11,7 +11,10 @@ from yaml_files import read_yaml
 
 from trajcli.curves.operations import reverse
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.time_optimal.parameterization import time_optimal
+from trajcli.curves.third_order import parameterization
+from trajcli.curves.third_order.convex_step import faster
+from trajcli.curves.third_order.parameterization import jerk_limited_time_optimal
+from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
 
 ORACLES = Path(__file__).parents[2] / "oracles" / "jerk_limited_splines.yaml"
 LINE = -np.array([1.243052, 0.789568, -0.903823, -0.246486, 1.217614, 0.200619, 0.062846])
@@ -132,6 +135,34 @@ def test_below_the_stations_of_copp(seed):
 @pytest.mark.parametrize("seed", few(range(24), 3))
 def test_random_problems_keep_all_limits(seed):
     judged_problem(seed)
+
+
+def between_states(seed):
+    """Return a path of two joints with its bounds, and the states at its ends, for laws that are given up early."""
+    draws = np.random.default_rng(seed)
+    path = spline(np.linspace(0, 1, 5), draws.uniform(-1, 1, (5, 2)).round(3))
+    bounds = [both([size, size]) for size in (2.0, 6.0, float(draws.choice([60, 120, 240])))]
+    speeds, rates = draws.uniform(0.02, 0.3, 2).round(3), draws.uniform(-1, 1, 2).round(3)
+    ends = {"start": (speeds[0], rates[0]), "end": (speeds[1], rates[1])}
+    return (path, *bounds), {**ends, "hopeless": 1.3, "slower": 1e-4}
+
+
+@pytest.mark.parametrize("seed", few([219, 132], 1))
+def test_a_law_that_comes_no_nearer_to_its_limits_is_given_up_early(seed, monkeypatch):
+    """It took 12 steps, two thirds of them on many nodes."""
+    problem, how = between_states(seed)
+    steps = []
+    monkeypatch.setattr(parameterization, "faster", lambda *given: steps.append(0) or faster(*given))
+    with pytest.raises(UnsettledSpeedError):
+        jerk_limited_time_optimal(*problem, **how)
+    assert len(steps) <= 8
+
+
+@pytest.mark.parametrize("seed", [110, 255, 264])
+def test_a_law_that_comes_nearer_slowly_is_waited_for(seed):
+    """Of the first two it is late that a step halves what they pass, the last one is nearly there for seven steps."""
+    problem, how = between_states(seed)
+    judged(*problem, **how)
 
 
 @pytest.mark.soak

@@ -39,7 +39,9 @@ _NEARLY = 1.5  # excess that is worth finer nodes
 _GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
 _REFINEMENTS = 7
 _SETTLING, _MOST_SETTLING = 8, 30  # steps with lowered limits; where nothing can be slowed down
-_FEWER, _PATIENCE = 512, 1  # nodes, and steps without a gain, where nobody waits for what is hopeless
+_FEWER = 512  # nodes where nobody waits for what is hopeless
+_PATIENCE, _HOPE = 4, 0.5  # steps there, and what part they must leave of the slowing that limits ask for
+_NEAR = 5e-3  # slowing that is so little is always worth another step
 _LOST = 1e-3  # of the duration, by estimate: finer nodes would not gain more
 _FEW_NEW = 0.02  # of the intervals: fewer new ones are not worth another step
 _LOWERED, _LOWERED_MORE = 1.1, 1.5  # times the excess that limits are lowered by
@@ -115,11 +117,12 @@ def jerk_limited_time_optimal(
         (JointConstraint(path, bounds[0], bounds[1]), *further),
         (JointJerkConstraint(path, bounds[2]), *further_jerk),
     )
-    search = _Search(limits, smoothed_law(path, second, (bounds[1], bounds[2]), ends), ends.rests, slower)
     hasty = np.isfinite(hopeless) and not ends.rests
+    law = smoothed_law(path, second, (bounds[1], bounds[2]), ends)
+    search = _Search(limits, law, ends.rests, slower, hasty=hasty)
     most = min(most_nodes(path), _FEWER) if hasty else most_nodes(path)
     lost = search.refine(most, np.inf if ends.rests else hopeless)
-    search.settle(most, _SETTLING if ends.rests or hasty else _MOST_SETTLING, _PATIENCE if hasty else np.inf)
+    search.settle(most, _SETTLING if ends.rests or hasty else _MOST_SETTLING)
     law, stretch = search.best, search.stretch
     if stretch > 1.0 + search.slower and not ends.rests:
         raise search.unsettled()
@@ -155,6 +158,7 @@ class _Search:
         limits: To be kept.
         rests: Whether it may be slowed down as a whole.
         slower: By what part it may be where it does not rest.
+        hasty: Whether nobody waits for limits that steps hardly come nearer to.
         law: The present one.
         excess: What it uses of the limits, shape (3, N).
         lowered: By what its limits are divided in each interval, shape (3, N).
@@ -164,9 +168,12 @@ class _Search:
         refinements: How often nodes were refined.
     """
 
-    def __init__(self, limits: LawLimits, law: QuarticLaw, rests: bool, slower: float) -> None:
+    def __init__(
+        self, limits: LawLimits, law: QuarticLaw, rests: bool, slower: float, *, hasty: bool = False
+    ) -> None:
         self.limits, self.rests, self.steps, self.refinements = limits, rests, 0, 0
-        self.slower = max(slower, _EXACT)
+        self.slower, self.hasty = max(slower, _EXACT), hasty
+        self._passed = [np.inf] * _PATIENCE
         self.lowered = np.ones((3, law.lengths.size))
         self.best, self.stretch = law, np.inf
         self._take(law)
@@ -207,12 +214,11 @@ class _Search:
                 break
             last = change
 
-    def settle(self, most: int, steps: int, patience: float) -> None:
+    def settle(self, most: int, steps: int) -> None:
         """Lower limits in the intervals that exceed them until little is left."""
         lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, min(self.slower, _SETTLED))
-        best, idle = self.stretch, 0
         for _ in range(steps):
-            if _stretch(self.excess) <= 1.0 + enough or idle > patience:
+            if _stretch(self.excess) <= 1.0 + enough or self._is_stuck():
                 break
             stubborn = ((self.excess > _STUBBORN) & (self.lowered > _STUBBORN)).any(axis=0)
             if stubborn.any() and self.law.lengths.size + stubborn.sum() <= most:
@@ -221,8 +227,6 @@ class _Search:
                 self._cut(np.where(stubborn, 2, 1))
             self.lowered = self.lowered * (1.0 + lowered * np.maximum(self.excess - 1.0, 0.0))
             self._step(_LAST_GAP)
-            idle = 0 if self.stretch < best else idle + 1
-            best = self.stretch
 
     def _cut(self, parts: NDArray[np.intp]) -> None:
         """Cut each interval into so many (N,) parts."""
@@ -240,7 +244,14 @@ class _Search:
             except ReversingLawError:
                 continue
             self._take(law)
-            return
+            break
+        self._passed.append(self.stretch - 1.0)
+        if self._is_stuck() and self.stretch > 1.0 + self.slower:
+            raise self.unsettled()
+
+    def _is_stuck(self) -> bool:
+        """Return whether steps hardly come nearer to the limits, where nobody waits for that."""
+        return self.hasty and self._passed[-1] > max(_NEAR, _HOPE * self._passed[-1 - _PATIENCE])
 
     def _take(self, law: QuarticLaw) -> None:
         """Go on from a law, and keep it where it is better than all before."""

@@ -116,7 +116,7 @@ class MotionSearch:
             second = best is not None
             if best is None or duration_of(parts) < duration_of(best):
                 best, self._motion = parts, _Motion(self.chain, row, found.states, self._lowering)
-            if self.exact:
+            if self.exact or (not second and self._leaves_zones(parts)):
                 break
             if self._adapted(_changes(chain, row, found, parts)) <= _ALIKE or second:
                 break
@@ -125,6 +125,10 @@ class MotionSearch:
         self.chain = self._motion.chain  # a later search may have lowered zones more
         self.model = min(self.model, duration_of(best) - self._motion.lowering)
         return best
+
+    def _leaves_zones(self, parts: Sequence[FlownPart]) -> bool:
+        """Return whether zones of a motion have to change: what is better now is not so then."""
+        return any(findings_of(self.chain, k, parts[k]) for k in range(1, len(parts), 2))
 
     def _ease(self, error: NoLawError, eased: Array, states: Array) -> None:
         """Ask for less of courses that have no law between the states that were found."""
