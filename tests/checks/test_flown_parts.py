@@ -9,7 +9,6 @@ import pytest
 from motions import limits, trajectory
 
 from trajcli.checks.verify import verify
-from trajcli.checks.zones import check_flown
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
 from trajcli.geometry.paths.orientation import FixedOrientation
@@ -22,6 +21,7 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.kinematics.zone import Zone, ZoneAround
+from trajcli.limits.parts import check_flown
 from trajcli.trajectory import MoveInterval, Promise
 
 FREE = limits(2)

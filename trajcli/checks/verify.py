@@ -126,7 +126,7 @@ def verify(
         findings += check_targets(trajectory, promises)
         findings += _check_tools(tools)
         if any(promise.parts for promise in promises):
-            from trajcli.checks.zones import check_flown
+            from trajcli.limits.parts import check_flown
 
             findings += check_flown(trajectory, promises)
     return Verdict(

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding, at_time
 from trajcli.kinematics.zone import ZONE_RELATIVE, ZoneAround
 from trajcli.limits.kinds import LimitedMove, families
-from trajcli.trajectory import MoveInterval, Span, Trajectory
+from trajcli.trajectory import MoveInterval, Promise, Span, Trajectory
+
+
+def check_flown(trajectory: Trajectory, promises: Sequence[Promise]) -> Iterator[Finding]:
+    """Yield what is wrong with the parts of moves that fly by corners.
+
+    Args:
+        trajectory: What to judge.
+        promises: What each span says of itself.
+    """
+    for span, promise in zip(trajectory.spans, promises, strict=True):
+        for part in promise.parts:
+            move = limited_part(trajectory, span, part)
+            if move.span.duration > 0:
+                yield from part_findings(move, part.around)
 
 
 def limited_part(trajectory: Trajectory, span: Span, part: MoveInterval) -> LimitedMove:
