@@ -39,8 +39,8 @@ _NEARLY = 1.5  # excess that is worth finer nodes
 _GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
 _REFINEMENTS = 7
 _SETTLING, _MOST_SETTLING = 8, 30  # steps with lowered limits; where nothing can be slowed down
-_FEWER = 512  # nodes where nobody waits for what is hopeless
-_PATIENCE, _HOPE = 4, 0.5  # steps there, and what part they must leave of the slowing that limits ask for
+_FEWER, _IDLE = 512, 1  # nodes, and last steps without a gain, where nobody waits for what is hopeless
+_PATIENCE, _HOPE = 4, 0.5  # steps, and what part they must leave of the slowing that limits ask for
 _NEAR = 5e-3  # slowing that is so little is always worth another step
 _LOST = 1e-3  # of the duration, by estimate: finer nodes would not gain more
 _FEW_NEW = 0.02  # of the intervals: fewer new ones are not worth another step
@@ -217,8 +217,9 @@ class _Search:
     def settle(self, most: int, steps: int) -> None:
         """Lower limits in the intervals that exceed them until little is left."""
         lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, min(self.slower, _SETTLED))
+        best, idle = self.stretch, 0
         for _ in range(steps):
-            if _stretch(self.excess) <= 1.0 + enough or self._is_stuck():
+            if _stretch(self.excess) <= 1.0 + enough or (self.hasty and idle > _IDLE):
                 break
             stubborn = ((self.excess > _STUBBORN) & (self.lowered > _STUBBORN)).any(axis=0)
             if stubborn.any() and self.law.lengths.size + stubborn.sum() <= most:
@@ -227,6 +228,8 @@ class _Search:
                 self._cut(np.where(stubborn, 2, 1))
             self.lowered = self.lowered * (1.0 + lowered * np.maximum(self.excess - 1.0, 0.0))
             self._step(_LAST_GAP)
+            idle = 0 if self.stretch < best else idle + 1
+            best = self.stretch
 
     def _cut(self, parts: NDArray[np.intp]) -> None:
         """Cut each interval into so many (N,) parts."""
@@ -246,12 +249,8 @@ class _Search:
             self._take(law)
             break
         self._passed.append(self.stretch - 1.0)
-        if self._is_stuck() and self.stretch > 1.0 + self.slower:
+        if self.hasty and self._passed[-1] > max(_NEAR, _HOPE * self._passed[-1 - _PATIENCE]):
             raise self.unsettled()
-
-    def _is_stuck(self) -> bool:
-        """Return whether steps hardly come nearer to the limits, where nobody waits for that."""
-        return self.hasty and self._passed[-1] > max(_NEAR, _HOPE * self._passed[-1 - _PATIENCE])
 
     def _take(self, law: QuarticLaw) -> None:
         """Go on from a law, and keep it where it is better than all before."""
