@@ -230,7 +230,7 @@ def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
                     array = npy.read_array(content, allow_pickle=False)
                 if array.dtype.kind in "fiu" and array.ndim:
                     found[member.filename.removesuffix(".npy")] = array
-    except (ValueError, zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, zlib.error) as error:
+    except (ValueError, zipfile.BadZipFile, EOFError, RuntimeError, zlib.error) as error:
         raise InputError(
             f"{source.file} is no archive of numpy: {error}".split("\n", maxsplit=1)[0]
         ) from error
