@@ -90,7 +90,7 @@ def long_states_loadtxt():
 def _points():
     import numpy as np
 
-    return np.cumsum(np.random.default_rng(0).uniform(-0.05, 0.05, (PIECES + 1, JOINTS)), axis=0)
+    return np.random.default_rng(0).uniform(-0.05, 0.05, (PIECES + 1, JOINTS)).cumsum(axis=0)
 
 
 def pieces():
@@ -101,7 +101,7 @@ def pieces():
     from trajcli.judge.arrays import judge_arrays, requirements_of
 
     t = 0.2 * np.arange(PIECES + 1)
-    q, qd, qdd = natural(t, _points()).evaluate_orders(t, (0, 1, 2)).transpose(1, 0, 2)
+    q, qd, qdd = natural(t, _points()).evaluate_orders(np.asarray(t), (0, 1, 2)).transpose(1, 0, 2)
     required = requirements_of("ur5e", {"acceleration": 9.0}, None, q)
     return lambda: judge_arrays(t, q, qd, qdd, required), lambda judgement: [float(judgement.rows)]
 

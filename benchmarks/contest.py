@@ -11,11 +11,11 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import IO, Any, Protocol
 
 REPEATS = 5
 ROOT = Path(__file__).parent.parent
@@ -109,9 +109,10 @@ class Command:
         lines = text.decode().splitlines()[1:]
         return [float(cell) for line in lines[:: max(1, len(lines) // 4)] for cell in line.split(",")]
 
-    def _start(self, **streams: object) -> subprocess.Popen[bytes]:
+    def _start(self, stdout: int, stderr: int | IO[bytes]) -> subprocess.Popen[bytes]:
+        arguments = [each for each in self.arguments if each is not None]
         try:
-            return subprocess.Popen(list(self.arguments), cwd=ROOT, env=_environment(), **streams)
+            return subprocess.Popen(arguments, cwd=ROOT, env=_environment(), stdout=stdout, stderr=stderr)
         except OSError as error:
             raise _failure(self.peer, b"", f"{self.arguments[0]}: {error.strerror}") from error
 
@@ -142,7 +143,7 @@ class Function:
             raise PeerError(NO_PEERS)
         self._complaints = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
         try:
-            self._process = subprocess.Popen(
+            self._process: Any = subprocess.Popen(
                 [self.python, "-m", "benchmarks.worker", self.module, self.name],
                 cwd=ROOT,
                 env=_environment() | _ONE_THREAD,
@@ -181,7 +182,7 @@ class Function:
         self._process.wait()
 
 
-def compete(contestants: dict[str, Contestant], repeats: int = REPEATS) -> dict[str, Runs]:
+def compete(contestants: Mapping[str, Contestant], repeats: int = REPEATS) -> dict[str, Runs]:
     """Let the contestants run in turns, after one run each that does not count.
 
     Returns:
@@ -192,7 +193,8 @@ def compete(contestants: dict[str, Contestant], repeats: int = REPEATS) -> dict[
     """
     results = {name: Runs() for name in contestants}
     with ExitStack() as stack:
-        left, expected = {}, []
+        left: dict[str, Contestant] = {}
+        expected: list[float] = []
         for name, contestant in contestants.items():
             try:
                 contestant.open(stack)

@@ -57,14 +57,16 @@ def cycle_times(job: dict[str, Any], metres: float) -> CycleTimes:
     chains = list(_chains(stopping.moves, job["moves"]))
     zone = job["zone"] * metres
     joints = all(move["planner"] in ("jerk_limited", "hold") for move in job["moves"])
-    bound = report_of(flying).flyby.bound
+    zones = report_of(flying).flyby
+    if zones is None:
+        raise RuntimeError("no corner is flown by")
     return CycleTimes(
         stopping.trajectory.duration - holds,
         _sum(pilz(chain, [zone] * (len(chain) - 1)) for chain in chains),
         _sum(justblend(chain, [zone] * (len(chain) - 1)) for chain in chains) if joints else None,
         flying.trajectory.duration - holds,
-        None if bound is None else bound.duration - holds,
-        None if bound is None else bound.method,
+        None if zones.bound is None else zones.bound.duration - holds,
+        None if zones.bound is None else zones.bound.method,
     )
 
 

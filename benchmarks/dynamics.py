@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from benchmarks.contest import Function, compete
+from benchmarks.contest import Function, Runs, compete
 from benchmarks.figures import Figure
 
 STATES = 100_000
@@ -130,7 +130,7 @@ def figures(peers: str | None, *, long: bool) -> list[Figure]:
         }
     )
     pairs = (("whole", "whole_without"), ("proof",))
-    alone = {}
+    alone: dict[str, Runs] = {}
     for pair in pairs:
         alone |= compete({name: Function(mine, module, name) for name in pair})
     theirs, path = recursion["pinocchio"], on_grid["toppra"]

@@ -16,13 +16,16 @@ def ours():
     """Prepare our evaluation of all orders at once, from the boundary values on."""
     import numpy as np
 
-    from trajcli.curves.hermite import hermite_pieces
+    from trajcli.curves.hermite import hermite_coefficients
+    from trajcli.curves.piecewise import PiecewisePolynomial
 
-    times, boundaries = _times(), np.zeros((3, 2, 6))
-    boundaries[0, 1] = TARGET
+    times, start, end = _times(), np.zeros((3, 6)), np.zeros((3, 6))
+    end[0] = TARGET
+    breaks = np.array([0.0, DURATION])
 
     def run():
-        curve = hermite_pieces([0.0, DURATION], boundaries)
+        coefficients = hermite_coefficients(start, end, np.array(DURATION))
+        curve = PiecewisePolynomial(breaks, coefficients[:, None, :])
         return curve.evaluate_orders(times, (0, 1, 2))
 
     return run, lambda motion: motion[:: SAMPLES // 4].reshape(-1)

@@ -19,12 +19,15 @@ def _ours(moving):
     from trajcli.planners.point_to_point.jerk_limited import Request, plan_motion
     from trajcli.trajectory import State
 
-    bounds = [np.tile([-value, value], (JOINTS, 1)) for value in (np.inf, VELOCITY, ACCELERATION, JERK)]
+    position, *rates = (
+        np.tile([-value, value], (JOINTS, 1)) for value in (np.inf, VELOCITY, ACCELERATION, JERK)
+    )
+    limits = Limits(position, rates[0], rates[1], jerk=rates[2])
     joints = tuple(Joint(f"j{k}") for k in range(1, JOINTS + 1))
-    robot = Robot("arm", joints, Limits(*bounds), "standard", np.eye(4), np.eye(4))
+    robot = Robot("arm", joints, limits, "standard", np.eye(4), np.eye(4))
     none = np.zeros(JOINTS)
     requests = [
-        Request(State(*start, none), State(*end, none), "position", "time", 0.0)
+        Request(State(start[0], start[1], none), State(end[0], end[1], none), "position", "time", 0.0)
         for start, end in zip(*_states(moving), strict=True)
     ]
     return lambda: [plan_motion(request, robot).curve.duration for request in requests], _shown

@@ -29,14 +29,14 @@ def _recording(compression):
     from trajcli.streams.mcap.recording import Recording
 
     zero = np.zeros((1, 6))
-    knots = Knots(np.zeros(1, np.int64), zero, zero, zero, Deviation(0.0, 0.0, 0.0, (0, 0, 0)))
+    knots = Knots(np.zeros(1, np.int64), zero, zero, zero, Deviation(0.0, 0.0, (0, 0)))
     return Recording(NAMES, 0, 0, ROWS * 10**6, knots, None, None, (), {}, (), compression)
 
 
 def ours(compression):
     """Prepare our writer, on the blocks in which rows are sampled."""
     from trajcli.columns import parse_column
-    from trajcli.samples import ROWS as SIZE
+    from trajcli.grids import ROWS as SIZE
     from trajcli.streams.mcap.write import write_mcap_blocks
 
     rows, columns = _rows(), [parse_column(name) for name in COLUMNS]

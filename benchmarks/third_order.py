@@ -7,6 +7,8 @@ of jerk says what they cost.
 from __future__ import annotations
 
 import sys
+from importlib import import_module
+from typing import Any
 
 from benchmarks.contest import Function, compete
 from benchmarks.figures import Figure
@@ -90,10 +92,10 @@ def _without(count):
 
 
 def _copp(count):
-    import copp_py as copp
     import numpy as np
     from scipy.interpolate import PPoly
 
+    copp: Any = import_module("copp_py")  # its types say less than it takes
     (breaks, coefficients), limits = _problem(count)
     n = STATIONS * (count - 1) + 1
     s, path = np.linspace(0.0, 1.0, n), PPoly(coefficients, breaks)

@@ -9,8 +9,8 @@ from types import ModuleType
 os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1", PYDANTIC_DISABLE_PLUGINS="__all__")
 gc.set_threshold(100_000, 20, 20)
 # as trajcli does: without what pydantic imports to look for plugins
-sys.modules["pydantic.plugin._loader"] = ModuleType("pydantic.plugin._loader")
-sys.modules["pydantic.plugin._loader"].get_plugins = tuple
+loader = sys.modules["pydantic.plugin._loader"] = ModuleType("pydantic.plugin._loader")
+vars(loader)["get_plugins"] = tuple
 
 import numpy as np  # noqa: E402
 import typer  # noqa: E402

@@ -31,8 +31,8 @@ def _answers() -> list[Figure]:
         (["robots"], ["plan", "-q", QUINTIC], 1.0),
     ):
         runs = compete({"ours": _trajcli(*words), "against": _trajcli(*against)})
-        names = [" ".join(Path(word).name for word in each) for each in (words, against)]
-        found.append(Figure(*names, runs["ours"].seconds, runs["against"].seconds, goal))
+        name, peer = (" ".join(Path(word).name for word in each) for each in (words, against))
+        found.append(Figure(name, peer, runs["ours"].seconds, runs["against"].seconds, goal))
     return found
 
 
@@ -72,11 +72,13 @@ def _many(folder: Path) -> list[Figure]:
     ours, few = runs[str(MOVES)], runs[str(MOVES // 10)]
     name = f"plan of {MOVES} quintic moves"
     kinds = ("jerk_limited", "quintic")
-    moves = compete({k: _trajcli("plan", "-q", _job(folder / f"{k}.yaml", k, 200)) for k in kinds})
+    jerky, smooth = compete(
+        {k: _trajcli("plan", "-q", _job(folder / f"{k}.yaml", k, 200)) for k in kinds}
+    ).values()
     return [
         Figure(name, "seconds", ours.seconds, [], 5.0, kind="seconds"),
         Figure(name, f"{MOVES // 10} moves", ours.seconds, few.seconds, 10.0),
-        Figure("plan of 200 jerk-limited moves", "quintic", *(moves[k].seconds for k in kinds), 2.0),
+        Figure("plan of 200 jerk-limited moves", "quintic", jerky.seconds, smooth.seconds, 2.0),
     ]
 
 

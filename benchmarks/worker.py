@@ -27,7 +27,7 @@ def main(module: str, name: str) -> None:
     run, numbers = getattr(import_module(module), name)()
     for line in sys.stdin:
         if line.strip() == "numbers":
-            answer = [float(number) for number in numbers(run())]
+            answer: float | list[float] = [float(number) for number in numbers(run())]
         else:
             run()
             start = _seconds()
