@@ -14,10 +14,17 @@ from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.zone import ZoneAround
+from trajcli.planners.flying_by import flown_parts as looked_for
 from trajcli.planners.flying_by import motion_search
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.chain_parts import PathPart
-from trajcli.planners.flying_by.flown_parts import flown_parts
+from trajcli.planners.flying_by.flown_parts import (
+    CourseLaws,
+    NoLawError,
+    along_path,
+    flown_parts,
+    zone_motion,
+)
 from trajcli.planners.flying_by.motion_search import POWERS, with_shares
 from trajcli.planners.flying_by.row import row_of
 from trajcli.planners.flying_by.search import begin_search
@@ -53,12 +60,12 @@ def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace
     """Even at a lower pace in its zone than elsewhere its motion is one: then it takes that much longer."""
     chain, stopping = chain_with(moves)
     chain = with_shares(chain, pace ** POWERS[None])
-    laws = StoppingLaws({})
+    laws = StoppingLaws(CourseLaws())
     assert laws.slow_all(chain)
     assert not laws.slow_all(chain)
     row = row_of(chain, [1.0, 1.0], [1.0, 1.0], laws.states(chain))
     states = begin_search(row.nodes, row.parts, chain.ends).found().states
-    parts = flown_parts(chain, row, states, laws.parts(chain))
+    parts = flown_parts(chain, row, states, CourseLaws(), laws.parts(chain))
     assert sum(part.curve.duration for part in parts) <= stopping / pace * (1 + 1e-5)
     for before, after in itertools.pairwise(parts):
         for order in range(3):
@@ -77,13 +84,13 @@ def test_laws_beside_a_zone_that_has_to_change_are_not_made_better(findings, tim
     monkeypatch.setattr(
         motion_search, "findings_of", lambda chain, number, part: findings if number == 1 else []
     )
-    motion_search.MotionSearch({}, by_order=True).fastest(chain_with("lines")[0])
+    motion_search.MotionSearch(CourseLaws(), by_order=True).fastest(chain_with("lines")[0])
     assert len(made) == times
 
 
 def test_a_state_comes_from_that_of_a_faster_law_to_that_of_the_one_that_stops():
     chain, _ = chain_with("joints")
-    laws, found = StoppingLaws({}), np.array([[0.0, 0.0], [1.2, -3.0], [1.1, 2.0], [0.0, 0.0]])
+    laws, found = StoppingLaws(CourseLaws()), np.array([[0.0, 0.0], [1.2, -3.0], [1.1, 2.0], [0.0, 0.0]])
     speeds = []
     for _ in range(3):
         laws.slow(chain, 0, None, found)
@@ -99,6 +106,50 @@ def test_a_state_comes_from_that_of_a_faster_law_to_that_of_the_one_that_stops()
     assert squares[1] - squares[2] == pytest.approx(0.3 * (1.2**2 - passed**2), rel=1e-6)
 
 
+def test_a_law_between_the_same_states_is_looked_for_once(monkeypatch):
+    made = []
+    monkeypatch.setattr(looked_for, "along_path", lambda *given: made.append(0) or along_path(*given))
+    chain, _ = chain_with("lines")
+    course, laws, rest, fast = (
+        chain.courses[0],
+        CourseLaws(),
+        np.zeros((2, 2)),
+        np.array([[0.0, 0.0], [9.0, 0.0]]),
+    )
+    whole, half = (0.0, course.length), (0.0, course.length / 2)
+    found = laws.along(course, 0, whole, rest, 1.0)
+    assert laws.along(course, 0, whole, rest.copy(), 1.0) is found
+    assert len(made) == 1
+    for _ in range(2):
+        with pytest.raises(NoLawError, match="between two zones") as refused:
+            laws.along(course, 0, whole, fast, 1.0)
+        assert refused.value.failing.keys() == {0}
+    assert len(made) == 2
+    others = [
+        laws.along(course, 0, half, rest, 1.0),
+        laws.along(course, 0, whole, rest, 0.5),
+        laws.along(chain.courses[1], 0, whole, rest, 1.0),
+    ]
+    assert len(made) == 5
+    assert len({part.curve.duration for part in (found, *others)}) == 4
+
+
+def test_a_zone_between_the_same_states_is_judged_once(monkeypatch):
+    """Where nothing but the share of another zone changes, the motion through it is as it was."""
+    made = []
+    monkeypatch.setattr(motion_search, "zone_motion", lambda *given: made.append(0) or zone_motion(*given))
+    search, (chain, _) = motion_search.MotionSearch(CourseLaws(), by_order=True), chain_with("joints")
+    search.chain, states = chain, np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.0], [0.0, 0.0]])
+    over = search._over(states)
+    assert search._over(states.copy()) == over
+    assert len(made) == 1
+    for other in (with_shares(chain, 0.9 ** POWERS[None]), chain_with("back")[0]):
+        search.chain = other
+        search._over(states)
+    search._over(0.5 * states)
+    assert len(made) == 4
+
+
 @pytest.mark.parametrize(("s", "slowed"), [(0.1, 1), (0.9, 2), (None, 3)])
 def test_the_border_nearer_to_where_a_law_fails_is_slowed(s, slowed):
     """Borders count from the start: course 1 has 1 and 2."""
@@ -107,7 +158,7 @@ def test_the_border_nearer_to_where_a_law_fails_is_slowed(s, slowed):
     longer = replace(
         chain, courses=(*chain.courses, chain.courses[0]), corners=(corner, corner), tempos=(1.0,) * 3
     )
-    laws = StoppingLaws({})
+    laws = StoppingLaws(CourseLaws())
     laws.slow(longer, 1, s, np.full((6, 2), 0.1))
     assert sum(laws.states(longer)) == slowed
 

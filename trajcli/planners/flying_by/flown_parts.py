@@ -61,8 +61,59 @@ class NoLawError(PlanningError):
         self.reason, self.failing = reason, dict(failing)
 
 
+class CourseLaws:
+    """Laws along courses, each of which is looked for once: chains that change keep most of their states."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[object, ...], tuple[Course, FlownPart | NoLawError]] = {}
+
+    def along(
+        self,
+        course: Course,
+        index: int,
+        stretch: tuple[float, float],
+        states: Array,
+        tempo: float,
+        part: ChainPart | None = None,
+    ) -> FlownPart:
+        """Return the fastest motion that is found along a course from one s to another.
+
+        Args:
+            course: Any.
+            index: Its number, for errors.
+            stretch: From which s to which.
+            states: There, (2, 2).
+            tempo: As of a chain.
+            part: With the bounds of the law of a straight line in joint space; None for those at that pace.
+
+        Raises:
+            NoLawError: When there is none.
+        """
+        if course.uniform:
+            if not isinstance(part, PathPart):
+                part = PathPart(slowed(course.typical_bounds(*stretch), tempo), stretch[1] - stretch[0])
+            return _along_line(course, part, stretch, states, index)
+        key = (id(course), index, stretch, states.tobytes(), tempo)
+        if key not in self._found:
+            found: FlownPart | NoLawError
+            try:
+                with _no_law(index):
+                    found = along_path(course, stretch, states, tempo)
+            except NoLawError as error:
+                found = error
+            self._found[key] = course, found  # a course that is kept shares its identity with no other
+        found = self._found[key][1]
+        if isinstance(found, NoLawError):
+            raise NoLawError(found.reason, found.failing)
+        return found
+
+
 def flown_parts(
-    chain: FlyByChain, row: ChainRow, states: Array, known: Mapping[int, FlownPart] | None = None
+    chain: FlyByChain,
+    row: ChainRow,
+    states: Array,
+    laws: CourseLaws,
+    known: Mapping[int, FlownPart] | None = None,
 ) -> list[FlownPart]:
     """Return the parts of the motion with given states at the nodes: courses and zones in turns.
 
@@ -70,6 +121,7 @@ def flown_parts(
         chain: Moves between two stops.
         row: As its nodes and parts.
         states: sd and sdd at the nodes, the ends included, (N, 2).
+        laws: Of courses.
         known: Motions along courses that are known, by number.
 
     Raises:
@@ -82,9 +134,7 @@ def flown_parts(
         ends = states[2 * k : 2 * k + 2]
         if k not in courses:
             try:
-                courses[k] = along_course(
-                    course, k, chain.stretch(k), ends, chain.tempos[k], row.parts[2 * k]
-                )
+                courses[k] = laws.along(course, k, chain.stretch(k), ends, chain.tempos[k], row.parts[2 * k])
             except NoLawError as error:
                 failed.append(error)
     if failed:
@@ -99,35 +149,6 @@ def flown_parts(
         names = corner.robot.joint_names
         parts += [_through(borders, joint_bounds(corner.limits), names), behind]
     return parts
-
-
-def along_course(
-    course: Course,
-    index: int,
-    stretch: tuple[float, float],
-    states: Array,
-    tempo: float,
-    part: ChainPart | None = None,
-) -> FlownPart:
-    """Return the fastest motion that is found along a course from one s to another.
-
-    Args:
-        course: Any.
-        index: Its number, for errors.
-        stretch: From which s to which.
-        states: There, (2, 2).
-        tempo: As of a chain.
-        part: With the bounds of the law of a straight line in joint space; None for those at that pace.
-
-    Raises:
-        NoLawError: When there is none.
-    """
-    if course.uniform:
-        if not isinstance(part, PathPart):
-            part = PathPart(slowed(course.typical_bounds(*stretch), tempo), stretch[1] - stretch[0])
-        return _along_line(course, part, stretch, states, index)
-    with _no_law(index):
-        return along_path(course, stretch, states, tempo)
 
 
 def _along_line(
@@ -263,26 +284,24 @@ def _quintic(problem: BoundaryProblem, duration: float) -> PiecewisePolynomial:
     return PiecewisePolynomial(np.array([0.0, duration]), coefficients)
 
 
-def zone_motions(chain: FlyByChain, states: Array) -> list[FlownPart]:
-    """Return the motions through the zones of a chain, without those along its paths.
+def zone_motion(chain: FlyByChain, number: int, states: Array) -> FlownPart:
+    """Return the motion through a zone of a chain, without those along its paths.
 
     Args:
         chain: Moves between two stops.
-        states: sd and sdd at the nodes, the ends included, (N, 2).
+        number: Of the zone.
+        states: sd and sdd on its two borders, (2, 2).
 
     Raises:
-        PlanningError: When some zone has no motion.
+        PlanningError: When there is none.
     """
-    parts = []
-    for k, corner in enumerate(chain.corners):
-        sides = ((chain.courses[k], corner.left), (chain.courses[k + 1], corner.joined))
-        borders = []
-        for (course, s), state in zip(sides, states[2 * k + 1 : 2 * k + 3], strict=True):
-            position, first, second = course.curve.evaluate_orders(np.array([s]), (0, 1, 2))[0]
-            rates = joint_rates(state[None], np.stack([first, second]))[0]
-            borders.append(np.column_stack([position, rates]))
-        parts.append(_through(borders, joint_bounds(corner.limits), corner.robot.joint_names))
-    return parts
+    corner, borders = chain.corners[number], []
+    sides = (chain.courses[number], corner.left), (chain.courses[number + 1], corner.joined)
+    for (course, s), state in zip(sides, states, strict=True):
+        position, first, second = course.curve.evaluate_orders(np.array([s]), (0, 1, 2))[0]
+        rates = joint_rates(state[None], np.stack([first, second]))[0]
+        borders.append(np.column_stack([position, rates]))
+    return _through(borders, joint_bounds(corner.limits), corner.robot.joint_names)
 
 
 def findings_of(chain: FlyByChain, number: int, part: FlownPart) -> list[Finding]:

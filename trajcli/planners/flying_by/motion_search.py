@@ -22,11 +22,12 @@ from trajcli.limits.kinds import TOOL_KINDS
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import (
+    CourseLaws,
     FlownPart,
     NoLawError,
     findings_of,
     flown_parts,
-    zone_motions,
+    zone_motion,
 )
 from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
 from trajcli.planners.flying_by.search import FoundStates, begin_search
@@ -73,11 +74,11 @@ class MotionSearch:
         lowered: Whether a derivative of the joints was lowered in a zone for a limit of the tool.
     """
 
-    def __init__(self, laws: dict[int, FlownPart], *, by_order: bool) -> None:
+    def __init__(self, laws: CourseLaws, *, by_order: bool) -> None:
         """Begin.
 
         Args:
-            laws: Of courses from stop to stop, as far as they are known.
+            laws: Of courses, as far as they are known.
             by_order: Whether limits of the tool lower in zones the derivative of the joints that they are
                 about, else the pace.
         """
@@ -87,7 +88,8 @@ class MotionSearch:
         self._paces: dict[int, float] = {}
         self._lowering = 0.0
         self._near: Array | None = None
-        self._laws = StoppingLaws(laws)
+        self._zones: dict[tuple[object, ...], list[Finding]] = {}
+        self._laws, self._stopping = laws, StoppingLaws(laws)
         self._motion: _Motion
 
     def fastest(self, chain: FlyByChain) -> list[FlownPart]:
@@ -103,11 +105,12 @@ class MotionSearch:
             paces = np.array([self._pace(k) for k in range(len(chain.courses))])
             found, row = self._searched(paces, eased)
             if not math.isfinite(found.duration):
-                if best is None and self._laws.slow_all(self.chain):
+                if best is None and self._stopping.slow_all(self.chain):
                     continue
                 break
             try:
-                parts = flown_parts(self.chain, row, found.states, self._laws.parts(self.chain))
+                known = self._stopping.parts(self.chain)
+                parts = flown_parts(self.chain, row, found.states, self._laws, known)
             except NoLawError as error:
                 if best is not None:
                     break
@@ -139,7 +142,7 @@ class MotionSearch:
                 eased[index] *= _EASED
             else:
                 self._paces.pop(id(course), None)  # the pace of the law that stops
-                self._laws.slow(self.chain, index, s, states)
+                self._stopping.slow(self.chain, index, s, states)
 
     @property
     def shares(self) -> Array:
@@ -163,7 +166,7 @@ class MotionSearch:
             return parts
         bent = np.repeat([not course.uniform for course in self.chain.courses], 2)
         bent[[0, -1]] = False
-        known = self._laws.parts(self.chain)
+        known = self._stopping.parts(self.chain)
         bent[[2 * k + side for k in known for side in (0, 1)]] = False
         states = self._motion.states
         for _ in range(_TRIES):
@@ -171,7 +174,7 @@ class MotionSearch:
             try:
                 if any(self._over(states)):
                     break
-                other = flown_parts(self.chain, self._motion.row, states, known)
+                other = flown_parts(self.chain, self._motion.row, states, self._laws, known)
             except PlanningError:
                 break
             if duration_of(other) > duration_of(parts) * (1 - _ENOUGH):
@@ -193,7 +196,7 @@ class MotionSearch:
         """Return the states found, and their row, once zones are as slow as limits ask for."""
         before = math.inf
         for turn in range(_LOWERINGS):
-            row = row_of(self.chain, paces.tolist(), eased.tolist(), self._laws.states(self.chain))
+            row = row_of(self.chain, paces.tolist(), eased.tolist(), self._stopping.states(self.chain))
             found = _found(row, self.chain.ends, self._near, twice=self.exact)
             if not math.isfinite(found.duration):
                 break
@@ -230,10 +233,15 @@ class MotionSearch:
 
     def _over(self, states: Array) -> list[list[Finding]]:
         """Return what is wrong with the motion through each zone."""
-        return [
-            findings_of(self.chain, 2 * k + 1, part)
-            for k, part in enumerate(zone_motions(self.chain, states))
-        ]
+        over = []
+        for k, corner in enumerate(self.chain.corners):
+            borders = states[2 * k + 1 : 2 * k + 3]
+            key = (k, corner.left, corner.joined, corner.shares, borders.tobytes())
+            if key not in self._zones:
+                motion = zone_motion(self.chain, k, borders)
+                self._zones[key] = findings_of(self.chain, 2 * k + 1, motion)
+            over.append(self._zones[key])
+        return over
 
     def _pace(self, index: int) -> float:
         """Return by what the law of a course is taken to be faster than its typical bounds let it be."""
@@ -241,7 +249,7 @@ class MotionSearch:
         if course.uniform:
             return 1.0
         if id(course) not in self._paces:
-            law, ends = self._laws.law(self.chain, index), self._laws.ends(self.chain, index)
+            law, ends = self._stopping.law(self.chain, index), self._stopping.ends(self.chain, index)
             part = PathPart(course.typical_bounds(0.0, course.length), course.length)
             expected = float(part.durations(ends[:1], ends[1:])[0, 0])
             self._paces[id(course)] = _CAREFUL * expected / law.curve.duration

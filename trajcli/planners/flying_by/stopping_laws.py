@@ -18,7 +18,7 @@ from trajcli.curves.operations import cut, scale_time, times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import frozen
 from trajcli.planners.flying_by.between_stops import FlyByChain
-from trajcli.planners.flying_by.flown_parts import FlownPart, along_course
+from trajcli.planners.flying_by.flown_parts import CourseLaws, FlownPart
 
 _SHARES = (0.6, 0.3, 0.0)  # of the faster state, one after another
 _APART = (
@@ -49,19 +49,15 @@ class StoppingLaws:
     The border of a course before zone k is number 2 k, that of the course behind it 2 k + 1.
     """
 
-    def __init__(self, laws: dict[int, FlownPart]) -> None:
-        """Begin without such borders, with the laws that are found of courses, by their identity."""
+    def __init__(self, laws: CourseLaws) -> None:
+        """Begin without such borders."""
         self._laws = laws
         self._mixtures: dict[int, _Mixture] = {}
 
     def law(self, chain: FlyByChain, index: int) -> FlownPart:
         """Return the fastest motion along a whole course; the first one begins as the chain does."""
-        course, ends = chain.courses[index], self.ends(chain, index)
-        if course.uniform:
-            return along_course(course, index, (0.0, course.length), ends, 1.0)
-        if id(course) not in self._laws:
-            self._laws[id(course)] = along_course(course, index, (0.0, course.length), ends, 1.0)
-        return self._laws[id(course)]
+        course = chain.courses[index]
+        return self._laws.along(course, index, (0.0, course.length), self.ends(chain, index), 1.0)
 
     @staticmethod
     def ends(chain: FlyByChain, index: int) -> Array:

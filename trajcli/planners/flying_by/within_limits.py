@@ -22,7 +22,7 @@ from trajcli.kinematics.zone import Zone, ZoneAround
 from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
-from trajcli.planners.flying_by.flown_parts import FlownPart, findings_of
+from trajcli.planners.flying_by.flown_parts import CourseLaws, FlownPart, findings_of
 from trajcli.planners.flying_by.motion_search import POWERS, MotionSearch, duration_of, with_shares
 from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import State
@@ -164,7 +164,7 @@ def _within_limits(
         PlanningError: When none is found.
     """
     found, errors = [], []
-    laws: dict[int, FlownPart] = {}
+    laws = CourseLaws()
     for by_order in (True, False):
         search = MotionSearch(laws, by_order=by_order)
         try:
