@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -97,10 +96,11 @@ class CourseLaws:
         if key not in self._found:
             found: FlownPart | NoLawError
             try:
-                with _no_law(index):
-                    found = along_path(course, stretch, states, tempo)
-            except NoLawError as error:
-                found = error
+                found = along_path(course, stretch, states, tempo)
+            except (UnreachableSpeedError, UnsettledSpeedError) as error:
+                found = NoLawError(str(error), {index: error.s})
+            except ReversingLawError as error:
+                found = NoLawError(str(error), {index: None})
             self._found[key] = course, found  # a course that is kept shares its identity with no other
         found = self._found[key][1]
         if isinstance(found, NoLawError):
@@ -203,16 +203,6 @@ def _between(curve: PiecewisePolynomial, low: float, high: float) -> PiecewisePo
     if low > curve.start:
         curve = cut(curve, low)[1]
     return cut(curve, high)[0] if high < curve.end else curve
-
-
-@contextmanager
-def _no_law(course: int) -> Iterator[None]:
-    try:
-        yield
-    except (UnreachableSpeedError, UnsettledSpeedError) as error:
-        raise NoLawError(str(error), {course: error.s}) from None
-    except ReversingLawError as error:
-        raise NoLawError(str(error), {course: None}) from None
 
 
 def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> FlownPart:
