@@ -64,8 +64,7 @@ class Figure:
 
     def as_json(self) -> dict[str, Any]:
         """Return everything for a program: s or bytes, each run, and the smallest and largest quotient."""
-        pairs = zip(self.ours, self.theirs, strict=False)  # the long job runs once
-        quotients = [ours / theirs for ours, theirs in pairs]
+        quotients = self._quotients()
         return {
             "benchmark": self.benchmark,
             "peer": self.peer,
@@ -81,12 +80,14 @@ class Figure:
             "runs": {"ours": list(self.ours), "theirs": list(self.theirs)},
         }
 
+    def _quotients(self) -> list[float]:
+        """Return those of runs in one turn, as many as both have; a run of no tick of the clock has none."""
+        return [ours / theirs for ours, theirs in zip(self.ours, self.theirs, strict=False) if theirs]
+
     def _spread(self) -> str:
         """Return the smallest and largest quotient of runs in one turn, or of our runs to their median."""
         own = [ours / median(self.ours) for ours in self.ours] if self.ours else []
-        quotients = (
-            [a / b for a, b in zip(self.ours, self.theirs, strict=False) if b] if self.kind == "time" else own
-        )
+        quotients = self._quotients() if self.kind == "time" else own
         return f"{min(quotients):.2f} to {max(quotients):.2f}" if quotients else "-"
 
     def _amount(self, runs: Sequence[float]) -> str:
