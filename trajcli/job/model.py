@@ -470,6 +470,6 @@ class Job(Model):
             try:
                 carried = move.carried_after(carried)
             except FlawError as error:
-                flaws = [(("moves", index, *path), text, hint) for path, text, hint in error.flaws]
+                flaws = error.below("moves", index)
                 raise refuse(flaws) from None
         return self

@@ -82,7 +82,7 @@ def pose_of_frame(value: Any, context: ReadingContext, chain: tuple[str, ...] = 
     try:
         outer = frame_named(value["in"], context, chain)
     except FlawError as error:
-        error.flaws = [(("in", *path), text, hint) for path, text, hint in error.flaws]
+        error.flaws = error.below("in")
         raise
     return np.asarray(outer @ Pose("").read({key: value[key] for key in value if key != "in"}, context))
 
@@ -107,7 +107,7 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
     try:
         frame = frame_named(value["in"], context)
     except FlawError as error:
-        error.flaws = [(("in", *path), text, hint) for path, text, hint in error.flaws]
+        error.flaws = error.below("in")
         raise
     try:
         pose = PoseFields.model_validate(given, context=context)

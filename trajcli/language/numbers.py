@@ -116,6 +116,10 @@ class FlawError(ValueError):
         super().__init__(message)
         self.flaws: list[Flaw] = [(path, message, hint)]
 
+    def below(self, *keys: str | int) -> list[Flaw]:
+        """Return the flaws of a value that stands at some keys of another one."""
+        return [((*keys, *path), text, hint) for path, text, hint in self.flaws]
+
 
 def refuse(flaws: Sequence[Flaw]) -> PydanticCustomError:
     """Return the error that carries the flaws of one value through pydantic."""

@@ -96,7 +96,7 @@ def _read_items(
             values[index] = read_one(item, index)
         except FlawError as error:
             prefix: FieldPath = () if key is None else (key,)
-            flaws += [((*prefix, *path), text, hint) for path, text, hint in error.flaws]
+            flaws += error.below(*prefix)
             if key is None:
                 break
     if flaws:

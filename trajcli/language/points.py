@@ -264,7 +264,7 @@ def _name_in(value: Mapping[str, Any], context: ReadingContext) -> str:
     try:
         return _names_from(name, context)[-1]
     except FlawError as error:
-        error.flaws = [(("from", *path), text, hint) for path, text, hint in error.flaws]
+        error.flaws = error.below("from")
         raise
 
 
@@ -304,7 +304,7 @@ def _offset(value: Mapping[str, Any], context: ReadingContext) -> Array:
     try:
         return Pose("").read(value.get("offset", {}), context)
     except FlawError as error:
-        error.flaws = [(("offset", *path), text, hint) for path, text, hint in error.flaws]
+        error.flaws = error.below("offset")
         raise
 
 
@@ -317,7 +317,7 @@ def _axes(frame: Any, context: ReadingContext) -> Array | None:  # noqa: ANN401
     try:
         return frame_named(frame, context)[:3, :3]
     except FlawError as error:
-        error.flaws = [(("frame", *path), text, hint) for path, text, hint in error.flaws]
+        error.flaws = error.below("frame")
         raise
 
 

@@ -137,7 +137,7 @@ def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -
         except InputError as error:
             raise FlawError(str(error), form, hint=error.problems[0].hint) from None
         except FlawError as error:
-            error.flaws = [((form, *path), text, hint) for path, text, hint in error.flaws]
+            error.flaws = error.below(form)
             raise
     if "xyz" in value:
         pose[:3, 3] = read_numbers(value["xyz"], 3, _LENGTH, context, "xyz")

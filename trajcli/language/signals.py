@@ -76,7 +76,7 @@ def read_signals(value: Any, context: ReadingContext) -> tuple[SignalAt, ...]:  
         try:
             signals.append(_read_one(item, context))
         except FlawError as error:
-            flaws += [((index, *path), text, hint) for path, text, hint in error.flaws]
+            flaws += error.below(index)
     if flaws:
         raise flawed(flaws)
     return tuple(signals)
@@ -128,7 +128,7 @@ def _read_one(value: Any, context: ReadingContext) -> SignalAt:  # noqa: ANN401
         try:
             fields[key] = readers[key](item, context)
         except FlawError as error:
-            flaws += [((key, *path), text, hint) for path, text, hint in error.flaws]
+            flaws += error.below(key)
     if flaws:
         raise flawed(flaws)
     when = fields.pop("when", "nearest")
@@ -143,5 +143,5 @@ def _read_when(value: Any, context: ReadingContext) -> str | float:  # noqa: ANN
         try:
             return float(_PATH.read(value["path"], context))
         except FlawError as error:
-            raise flawed([(("path", *path), text, hint) for path, text, hint in error.flaws]) from None
+            raise flawed(error.below("path")) from None
     raise FlawError(f"expected {', '.join(_MOMENTS)} or {{path: L}}, got {shown(value)}")

@@ -126,7 +126,7 @@ def _inline(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
         try:
             positions.append(one.read(row, context))
         except FlawError as error:
-            error.flaws = [(("positions", index, *path), text, hint) for path, text, hint in error.flaws]
+            error.flaws = error.below("positions", index)
             raise
     if "times" not in value:
         return Recorded(np.array(positions))
@@ -140,7 +140,7 @@ def _merge(value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: A
     try:
         return _MERGE.read(value, context)
     except FlawError as error:
-        error.flaws = [(("merge", *path), text, hint) for path, text, hint in error.flaws]
+        error.flaws = error.below("merge")
         raise
 
 

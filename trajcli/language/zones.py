@@ -101,7 +101,7 @@ def _read_parts(value: Mapping[str, Any], context: ReadingContext) -> dict[str, 
         try:
             parts[key] = _PARTS[key].read(item, context)
         except FlawError as error:
-            flaws += [((key, *path), text, hint) for path, text, hint in error.flaws]
+            flaws += error.below(key)
     if flaws:
         raise flawed(flaws)
     return parts

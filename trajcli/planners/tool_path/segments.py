@@ -165,7 +165,7 @@ def _within(key: str, read: Callable[[], T]) -> T:
     try:
         return read()
     except FlawError as error:
-        error.flaws = [((key, *at), text, hint) for at, text, hint in error.flaws]
+        error.flaws = error.below(key)
         raise
 
 

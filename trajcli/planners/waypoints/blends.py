@@ -128,7 +128,7 @@ class BlendDurations(FieldType):
             try:
                 durations.append(_BLEND.read(item, context))
             except FlawError as error:
-                flaws += [((index, *path), text, hint) for path, text, hint in error.flaws]
+                flaws += error.below(index)
         if flaws:
             raise flawed(flaws)
         return tuple(durations)

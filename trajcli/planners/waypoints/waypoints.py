@@ -64,7 +64,7 @@ class SegmentTimes(FieldType):
             try:
                 times.append(_TIME.read(item, context))
             except FlawError as error:
-                flaws += [((index, *path), text, hint) for path, text, hint in error.flaws]
+                flaws += error.below(index)
         if flaws:
             raise flawed(flaws)
         return tuple(times)
