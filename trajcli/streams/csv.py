@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.columns import Column, require_finite, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
-from trajcli.streams.decimals import Digits, NotFixedError, encode_fixed, scan_fixed
+from trajcli.streams.decimals import DECIMALS, Digits, NotFixedError, encode_fixed, scan_fixed
 
 _CHUNK = 1 << 18  # bytes read back at a time
 _HALF_UNIT = 0.5e-9 + 1e-12  # the last decimal's half, and the first of the two roundings
@@ -96,6 +96,7 @@ class _RowsReadBack:
         self._columns = columns
         self._width = len(columns)
         self._whole_numbers = whole_number_columns(columns)
+        self._decimals = [DECIMALS * (k not in self._whole_numbers) for k in range(self._width)]
         self._left = np.empty((0, self._width))
         self._text = b""  # read, but not yet as rows
 
@@ -131,7 +132,7 @@ class _RowsReadBack:
             return None
         text += b"" if text.endswith(b"\n") else self._stream.readline()
         with suppress(NotFixedError):
-            return scan_fixed(text, self._width, self._whole_numbers)
+            return scan_fixed(text, self._decimals)
         from trajcli.streams.number_cells import scan_decimals
 
         try:

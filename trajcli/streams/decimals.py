@@ -170,6 +170,7 @@ def _as_words(characters: NDArray[np.uint8]) -> _Words:
     return np.ascontiguousarray(characters).view(np.uint32)[:, 0]
 
 
+_AT_ONCE = 8  # digits that are read together
 _FRONT = b"0" * 24  # room for words that begin before the first cell
 _ZEROS = np.uint64(0x3030303030303030)
 _SIXES = np.uint64(0x0606060606060606)
@@ -182,33 +183,31 @@ class NotFixedError(ValueError):
     """The text is not of the one form that this reader knows."""
 
 
-def scan_fixed(text: bytes, width: int, whole_numbers: Sequence[int] = ()) -> Array:
+def scan_fixed(text: bytes, decimals: Sequence[int]) -> Array:
     """Return the rows (N, width) of `text`.
 
     Args:
         text: Lines that end in a line feed, cells of the form -12.345678901 separated by commas.
-        width: Cells of a line.
-        whole_numbers: Columns whose cells have no decimals.
+        decimals: How many the cells of each column have; 0 for whole numbers without a point.
 
     Raises:
-        NotFixedError: When anything at all differs from that form, or a value is above 9e6.
+        NotFixedError: When anything at all differs from that form, or a number has more digits than are
+            exact.
     """
     buffer = np.frombuffer(_FRONT + text, dtype=np.uint8)
-    ends = _cell_ends(buffer, width)
+    ends = _cell_ends(buffer, len(decimals))
     starts = np.empty_like(ends)
     starts[0], starts[1:] = len(_FRONT), ends[:-1] + 1
     negative = buffer[starts] == ord("-")
     starts += negative
-    rows = np.empty((ends.size // width, width))
-    fixed = np.ones(width, dtype=bool)
-    fixed[list(whole_numbers)] = False
-    if not fixed.all():
-        counting = np.tile(~fixed, len(rows))
-        rows[:, ~fixed] = _whole_numbers(buffer, starts[counting], ends[counting]).reshape(len(rows), -1)
-        decimal = ~counting
-        rows[:, fixed] = _decimals(buffer, starts[decimal], ends[decimal]).reshape(len(rows), -1)
-    else:
-        rows[:] = _decimals(buffer, starts, ends).reshape(rows.shape)
+    rows = np.empty((ends.size // len(decimals), len(decimals)))
+    for count in set(decimals):
+        alike = np.equal(decimals, count)
+        if alike.all():
+            rows[:] = _magnitudes(buffer, starts, ends, count).reshape(rows.shape)
+        else:
+            cells = np.tile(alike, len(rows))
+            rows[:, alike] = _magnitudes(buffer, starts[cells], ends[cells], count).reshape(len(rows), -1)
     return np.negative(rows, out=rows, where=negative.reshape(rows.shape))
 
 
@@ -223,30 +222,31 @@ def _cell_ends(buffer: NDArray[np.uint8], width: int) -> _Indices:
     return ends
 
 
-def _decimals(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices) -> Array:
-    """Return the magnitudes (N,) of cells with nine decimals; `starts` is behind the sign."""
-    point = ends - (DECIMALS + 1)
-    first = buffer[point + 1] - np.uint8(ord("0"))
-    if (buffer[point] != ord(".")).any() or (first > 9).any():
+def _magnitudes(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices, decimals: int) -> Array:
+    """Return the magnitudes (N,) of cells with so many decimals; `starts` is behind the sign."""
+    if not decimals:
+        return _digits_between(buffer, starts, ends).astype(np.float64)
+    point, last = ends - (decimals + 1), min(decimals, _AT_ONCE)
+    if decimals > DECIMALS or (buffer[point] != ord(".")).any():
         raise NotFixedError
     units = _digits_between(buffer, starts, point).astype(np.int64)
-    units *= 10
-    units += first
-    units *= 10**8
-    units += _digits_between(buffer, ends - 8, ends).astype(np.int64)
+    if decimals > last:
+        first = buffer[point + 1] - np.uint8(ord("0"))
+        if (first > 9).any():
+            raise NotFixedError
+        units *= 10
+        units += first
+    units *= 10**last
+    units += _digits_between(buffer, ends - last, ends).astype(np.int64)
     if units.max(initial=0) >= 2**53:
         raise NotFixedError
-    return units / 10.0**DECIMALS
-
-
-def _whole_numbers(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices) -> Array:
-    return _digits_between(buffer, starts, ends).astype(np.float64)
+    return units / 10.0**decimals
 
 
 def _digits_between(buffer: NDArray[np.uint8], starts: _Indices, ends: _Indices) -> _LongWords:
     """Return the whole numbers of 1 to 8 digits in buffer[start:end]."""
     length = ends - starts
-    if length.min(initial=1) < 1 or length.max(initial=1) > 8:
+    if length.min(initial=1) < 1 or length.max(initial=1) > _AT_ONCE:
         raise NotFixedError
     # Every byte of the buffer seen as the start of a word.
     words = np.ndarray(buffer.size - 7, dtype="<u8", buffer=buffer, strides=(1,))

@@ -10,10 +10,9 @@ from typing import BinaryIO, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import parse_column, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
-from trajcli.streams.decimals import DECIMALS, NotFixedError, scan_fixed
+from trajcli.streams.decimals import NotFixedError, scan_fixed
 from trajcli.streams.number_cells import decimals_of, scan_decimals
 from trajcli.streams.text_layout import LONGEST_LINE, Header, RowLayout, is_number, layout_of
 
@@ -69,12 +68,9 @@ class RowReader:
         self._line = header.line + 1
         self._layout: RowLayout | None = None
         self._texts: bytes | None = None  # of the fixed columns in the first row
-        names = [header.names[index] for index in self._taken]
-        self.decimals = np.zeros(len(names), dtype=np.int64)
-        self._nine_decimals = True  # until they are not
-        self._whole_numbers = whole_number_columns(map(parse_column, names))
-        self._fixed_decimals = np.full(len(names), DECIMALS)
-        self._fixed_decimals[list(self._whole_numbers)] = 0
+        self.decimals = np.zeros(len(self._taken), dtype=np.int64)
+        self._fixed_form = True  # as many decimals as in the first row, until they are not
+        self._first: list[int] = []
 
     def read(self, text: bytes) -> Array:
         """Return the rows (N, columns) of whole lines.
@@ -90,7 +86,7 @@ class RowReader:
             self._layout = layout_of(self._header.names, self._header.text, first)
         layout = self._layout
         plain = text if text.endswith(b"\n") else text + b"\n"
-        usual = layout.separator == "," and not layout.open_ended and self._nine_decimals
+        usual = layout.separator == "," and not layout.open_ended and self._fixed_form
         plain = plain if usual else layout.plain(plain)
         try:
             rows = self._numbers(plain)
@@ -104,12 +100,16 @@ class RowReader:
         if not self._all:
             text = self._taken_cells(text)
         width = len(self._taken)
-        if self._nine_decimals:
+        if not self._first:
+            cells = text.partition(b"\n")[0].split(b",")
+            self._first = [len(cell.partition(b".")[2]) for cell in cells]
+            self._fixed_form = len(cells) == width
+        if self._fixed_form:
             try:
-                rows = scan_fixed(text, width, self._whole_numbers)
-                self.decimals = np.maximum(self.decimals, self._fixed_decimals)
+                rows = scan_fixed(text, self._first)
+                self.decimals = np.maximum(self.decimals, self._first)
             except NotFixedError:
-                self._nine_decimals = False
+                self._fixed_form = False
             else:
                 return rows
         rows, decimals = scan_decimals(text, width)
