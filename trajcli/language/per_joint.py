@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from pydantic.json_schema import JsonSchemaValue
 
@@ -25,6 +25,8 @@ from trajcli.language.numbers import (
 from trajcli.units import Quantity
 
 LowerUpper = tuple[float, float]
+K = TypeVar("K", str, int)
+V = TypeVar("V")
 UNLIMITED: LowerUpper = (-math.inf, math.inf)
 
 
@@ -109,6 +111,23 @@ def flawed(flaws: list[Flaw]) -> FlawError:
     error = FlawError("; ".join(flaw[1] for flaw in flaws))
     error.flaws = flaws
     return error
+
+
+def read_each(items: Iterable[tuple[K, Any]], read: Callable[[K, Any], V]) -> dict[K, V]:
+    """Return what each item is read as, by its key.
+
+    Raises:
+        FlawError: With the flaws of all, each below the key of its item.
+    """
+    values, flaws = dict[K, V](), list[Flaw]()
+    for key, item in items:
+        try:
+            values[key] = read(key, item)
+        except FlawError as error:
+            flaws += error.below(key)
+    if flaws:
+        raise flawed(flaws)
+    return values
 
 
 def with_pair_hint(error: FlawError, value: object) -> FlawError:

@@ -10,7 +10,7 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
 from trajcli.language.numbers import AT_KEY, FlawError, Name, Number, ReadingContext, shown
-from trajcli.language.per_joint import flawed
+from trajcli.language.per_joint import flawed, read_each
 from trajcli.units import Quantity
 
 Moment = Literal["enter", "nearest", "leave"]
@@ -71,15 +71,7 @@ def read_signals(value: Any, context: ReadingContext) -> tuple[SignalAt, ...]:  
         return (_read_one(value, context),)
     if not value:
         raise FlawError("expected at least one signal")
-    signals, flaws = [], []
-    for index, item in enumerate(value):
-        try:
-            signals.append(_read_one(item, context))
-        except FlawError as error:
-            flaws += error.below(index)
-    if flaws:
-        raise flawed(flaws)
-    return tuple(signals)
+    return tuple(read_each(enumerate(value), lambda _, item: _read_one(item, context)).values())
 
 
 def written_signals(value: tuple[SignalAt, ...], context: ReadingContext) -> list[dict[str, Any]]:
@@ -121,16 +113,8 @@ def _read_one(value: Any, context: ReadingContext) -> SignalAt:  # noqa: ANN401
     missing = [key for key in ("signal", "value") if key not in value]
     if missing:
         raise FlawError(f"`{missing[0]}` is missing", hint=f"a signal is {form}")
-    fields: dict[str, Any] = {}
-    flaws = []
     readers = {"signal": _NAME.read, "value": _VALUE.read, "before": _BEFORE.read, "when": _read_when}
-    for key, item in value.items():
-        try:
-            fields[key] = readers[key](item, context)
-        except FlawError as error:
-            flaws += error.below(key)
-    if flaws:
-        raise flawed(flaws)
+    fields: dict[str, Any] = read_each(value.items(), lambda key, item: readers[key](item, context))
     when = fields.pop("when", "nearest")
     return SignalAt(**fields, **({"when": when} if isinstance(when, str) else {"along": when}))
 

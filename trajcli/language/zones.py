@@ -12,7 +12,7 @@ from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
 from trajcli.language.numbers import AT_KEY, FieldType, FlawError, Number, ReadingContext, shown
-from trajcli.language.per_joint import JointDistance, flawed
+from trajcli.language.per_joint import JointDistance, read_each
 from trajcli.units import Quantity
 
 if TYPE_CHECKING:
@@ -96,12 +96,4 @@ def _read_parts(value: Mapping[str, Any], context: ReadingContext) -> dict[str, 
         if not value:
             raise FlawError(f"a zone needs one of {listed}")
         raise FlawError(f"a zone has no '{unknown[0]}'", unknown[0], AT_KEY, hint=f"it has {listed}")
-    parts, flaws = {}, []
-    for key, item in value.items():
-        try:
-            parts[key] = _PARTS[key].read(item, context)
-        except FlawError as error:
-            flaws += error.below(key)
-    if flaws:
-        raise flawed(flaws)
-    return parts
+    return read_each(value.items(), lambda key, item: _PARTS[key].read(item, context))

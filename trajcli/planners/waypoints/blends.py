@@ -21,12 +21,11 @@ from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import (
     FieldType,
     Flaw,
-    FlawError,
     Number,
     ReadingContext,
     refuse,
 )
-from trajcli.language.per_joint import flawed
+from trajcli.language.per_joint import read_each
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import JointAccelerationMagnitudes, Target
 from trajcli.planners.boundary_states import missing_limit, standstill, start_in_motion
@@ -123,15 +122,7 @@ class BlendDurations(FieldType):
         """Return seconds."""
         if not isinstance(value, list | tuple):
             return _BLEND.read(value, context)
-        durations, flaws = [], list[Flaw]()
-        for index, item in enumerate(value):
-            try:
-                durations.append(_BLEND.read(item, context))
-            except FlawError as error:
-                flaws += error.below(index)
-        if flaws:
-            raise flawed(flaws)
-        return tuple(durations)
+        return tuple(read_each(enumerate(value), lambda _, item: _BLEND.read(item, context)).values())
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a number or a list."""

@@ -25,7 +25,7 @@ from trajcli.language.numbers import (
     refuse,
     shown,
 )
-from trajcli.language.per_joint import flawed
+from trajcli.language.per_joint import read_each
 from trajcli.language.recorded import Recorded
 from trajcli.language.waypoints import Waypoint
 from trajcli.planners.boundary_states import missing_limit, standstill
@@ -58,16 +58,7 @@ class SegmentTimes(FieldType):
         """Return seconds."""
         if not isinstance(value, list | tuple) or not value:
             raise FlawError(f"expected a list of times, one for each segment, got {shown(value)}")
-        times: list[float] = []
-        flaws: list[Flaw] = []
-        for index, item in enumerate(value):
-            try:
-                times.append(_TIME.read(item, context))
-            except FlawError as error:
-                flaws += error.below(index)
-        if flaws:
-            raise flawed(flaws)
-        return tuple(times)
+        return tuple(read_each(enumerate(value), lambda _, item: _TIME.read(item, context)).values())
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of the list."""
