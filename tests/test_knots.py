@@ -358,13 +358,17 @@ def test_steps_that_follow_each_other_soon_have_two_knots_each() -> None:
     assert knots.acceleration[1:-1, 0] == pytest.approx(np.repeat((-1.0) ** np.arange(8), 2)[1:-1], abs=1e-9)
 
 
-@pytest.mark.parametrize("apart", [40_000, 100_000, 600_000])
+@pytest.mark.parametrize("apart", [30_000, 40_000, 100_000, 600_000])
 def test_steps_near_to_each_other_between_long_pieces_have_two_knots_each(apart: int) -> None:
-    """The first has its neighbour behind it, the last before it: a quarter of the way to that is left to either side."""
+    """The first has its neighbour behind it, the last before it: a quarter of the way, at least 10 us."""
     curve = rising([0.0, 1.0, 1.0 + 1e-9 * apart, 2.5], [1.0, -1.0, 1.0], 2)
     knots = knots_of(made_of(curve, ending(curve)))
     steps = 1_000_000_000 + apart * np.arange(2)
     half = min(apart // 4, 200_000)
+    if half < 10_000:  # there rounding would show: a knot stands at each
+        whole = knots.nanoseconds
+        assert whole[np.abs(whole - steps.mean()) < 2 * apart].tolist() == steps.tolist()
+        return
     assert knots.nanoseconds[1:-1].tolist() == (steps[:, None] + [-half, half]).ravel().tolist()
     assert knots.acceleration[1:-1, 0] == pytest.approx([1.0, -1.0, -1.0, 1.0], abs=1e-9)
 
@@ -396,7 +400,9 @@ def test_what_knots_cannot_cure_has_no_more_of_them(side: float) -> None:
     far = rising([0.0, 0.1, 100.0, 100.1], [side * 1e7, 0.0, -side * 1e7], 2)
     assert len(knots_of(made_of(far, ending(far)), 2).nanoseconds) == 4
     ramp = rising([0.0, 0.1, 0.100000003, 2.0], [0.0, 1e8, 0.0], 2)
-    assert len(knots_of(made_of(ramp, ending(ramp)), 2).nanoseconds) <= 70
+    knots = knots_of(made_of(ramp, ending(ramp)), 2)
+    assert len(knots.nanoseconds) <= 70
+    assert knots.deviation.position <= LARGEST_DEVIATION / 10  # as of all cubics
 
 
 def test_knots_are_a_microsecond_apart_however_much_is_missed() -> None:

@@ -85,12 +85,15 @@ def test_a_part_that_leaves_its_zone_is_found(joint: int, size: float, left: boo
         assert each.severity == "error"
 
 
-def test_the_verdict_holds_what_is_wrong_with_parts() -> None:
-    whole = trajectory(steady(1.0, 2.0, 3.0))
+@pytest.mark.parametrize("move", [0, 1])
+def test_the_verdict_holds_what_is_wrong_with_parts(move: int) -> None:
+    """Of either move, whether the other one flies by a corner or not."""
+    whole = trajectory(steady(1.0, 2.0, 3.0), steady(1.0, 2.0, 3.0))
     promise = Promise(parts=(part(0, 1), part(1, 2, limits(2, velocity=1.9)), part(2, 3)))
-    verdict = verify(whole, [FREE], [promise])
+    promises = [promise, Promise()] if move == 0 else [Promise(), promise]
+    verdict = verify(whole, [FREE] * 2, promises)
     assert not verdict.passed
-    assert ("velocity", 0) in {(each.kind, each.move) for each in verdict.findings}
+    assert [each.move for each in verdict.findings if each.kind == "velocity"] == [move]
 
 
 def test_what_counts_for_a_move_in_parts_is_what_its_parts_allow() -> None:

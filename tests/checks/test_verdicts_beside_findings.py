@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from motions import between, limits, state, trajectory
+from test_check_tool import RIGHT
 
 from trajcli.checks.verify import _sampled, longest_factor, verify
 from trajcli.curves.piecewise import PiecewisePolynomial
@@ -33,11 +34,17 @@ def test_limits_of_a_tool_that_nobody_knows_are_named_where_the_arm_moves() -> N
     assert verify(moving, [OF_THE_TOOL]).unchecked_of_tool == ("speed", "angular_acceleration")
     assert verify(moving, [limits()]).unchecked_of_tool == ()
     assert verify(still, [OF_THE_TOOL]).unchecked_of_tool == ()  # it does not move at all
+    one_of_two = trajectory(between([0.0, 0.0], [0.0, 1.0]))
+    assert verify(one_of_two, [replace(limits(2), tcp=OF_THE_TOOL.tcp)]).unchecked_of_tool
     both = trajectory(between([0.0], [1.0]), resting())
     assert verify(both, [limits(), OF_THE_TOOL]).unchecked_of_tool == ()
     assert verify(both, [OF_THE_TOOL, limits()]).unchecked_of_tool == ("speed", "angular_acceleration")
     known = replace(arm(), limits=OF_THE_TOOL)
     assert verify(moving, [OF_THE_TOOL], [Promise(robot=known)]).unchecked_of_tool == ()
+    two = trajectory(between([0.0], [1.0]), between([1.0], [0.0]))
+    for promises, unknown in (([known, None], True), ([None, known], False)):
+        verdict = verify(two, [limits(), OF_THE_TOOL], [Promise(robot=robot) for robot in promises])
+        assert bool(verdict.unchecked_of_tool) == unknown
 
 
 def test_a_move_of_joints_is_along_no_path() -> None:
@@ -45,6 +52,12 @@ def test_a_move_of_joints_is_along_no_path() -> None:
     moving = trajectory(between([0.0], [1.0]))
     verdict = verify(moving, [limits()], [Promise(robot=arm())])
     assert (verdict.passed, verdict.sampled) == (True, ())
+
+
+def test_a_path_of_a_tool_that_no_arm_carries_is_not_judged() -> None:
+    verdict = verify(RIGHT.trajectory, [limits(6)], [Promise(tool=RIGHT.motion)])
+    assert (verdict.passed, verdict.sampled) == (True, ())
+    assert verify(RIGHT.trajectory, [limits(6)], [Promise(tool=RIGHT.motion, robot=RIGHT.robot)]).sampled
 
 
 def test_each_move_says_what_it_uses_of_its_limits_by_position() -> None:
@@ -81,6 +94,8 @@ def test_what_joins_the_acceleration_is_advised_against_jerk_alone(kind: str) ->
     hints = advice(whole, limits(**bound))
     assert hints["acceleration_jump"]
     assert hints["jerk"] == hints["acceleration_jump"]
+    told = advice(whole, limits(**bound), remedies={"acceleration_jump": "take a quintic"})
+    assert (told["acceleration_jump"], told["jerk"]) == ("take a quintic",) * 2
     if kind == "velocity":
         assert hints["velocity"] != hints["acceleration_jump"]
         assert "longer" in hints["velocity"]
@@ -133,3 +148,12 @@ def test_a_move_of_several_parts_is_named_once() -> None:
     tools = [SimpleNamespace(span=SimpleNamespace(index=move), sampled=(what,)) for move, what in told]
     assert _sampled(tools) == (("distance", (0, 2)), ("branch", (0, 2, 3)))  # type: ignore[arg-type]
     assert _sampled(tools[:-1]) == (("distance and branch", (0, 2)),)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("last", [False, True])
+def test_no_duration_helps_a_move_that_is_over_its_limit_at_either_end(last: bool) -> None:
+    """It declares to begin or to end at 2 rad/s, where 1 rad/s is allowed."""
+    ends = (state([0.0]), state([1.0], velocity=2.0))
+    whole = trajectory(between([0.0], [1.0], duration=0.5))
+    hints = advice(whole, limits(velocity=1.0), ends=ends if last else ends[::-1])
+    assert "starts or ends over its limit" in hints["velocity"]

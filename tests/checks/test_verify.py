@@ -50,6 +50,15 @@ def test_the_verdict_holds_what_the_checks_find_by_move_and_time() -> None:
     assert [(s.move, s.time) for s in verdict.steps] == [(0, 0.0), (0, 1.0)]
 
 
+def test_findings_of_an_early_move_come_first_whoever_makes_them() -> None:
+    """The first move alone begins with a jump, the second alone goes 1.875 rad/s: limits are looked at before jumps."""
+    slow, fast = between([0.0], [1.0], duration=9.0), between([1.0], [0.0], duration=1.0)
+    found = verify(
+        trajectory(slow, fast, start=state([0.0], velocity=0.1)), [limits(velocity=1.0)] * 2
+    ).findings
+    assert [(each.move, each.kind) for each in found] == [(0, "velocity_jump"), (1, "velocity")]
+
+
 def test_what_nobody_limits_is_said() -> None:
     whole = trajectory(between([0.0, 0.0], [1.0, 1.0]), between([1.0, 1.0], [0.0, 0.0]))
     all_bounded = limits(2, position=9.0, velocity=9.0, acceleration=9.0, jerk=99.0)
@@ -68,6 +77,10 @@ def test_efforts_are_left_unchecked_where_a_load_is_moved(loaded: tuple[int, ...
     spans = tuple(replace(span, payload=load) if span.index in loaded else span for span in plain.spans)
     bounds = limits(position=9.0, velocity=9.0, acceleration=9.0, jerk=99.0)
     assert verify(replace(plain, spans=spans), [bounds] * 3).unchecked == unchecked
+    stated = replace(bounds, effort=np.array([[-1.0, 1.0]]))
+    whole = replace(plain, spans=tuple(replace(span, payload=load) for span in plain.spans))
+    for efforts in ((stated, bounds, bounds), (bounds, bounds, stated)):  # in either move that lasts
+        assert verify(whole, efforts).unchecked == (("j1", "effort"),)
 
 
 @pytest.mark.parametrize("order", [1, -1])

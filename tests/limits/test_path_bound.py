@@ -290,7 +290,8 @@ def test_a_piece_that_rounding_begins_before_a_border_is_of_the_segment_behind()
 def test_what_has_no_bound_is_left_to_rows_and_said() -> None:
     right = tool(standing(), law())
     assert list(right.sampled) == ["branch"]
-    assert most(tool(standing(), law(), orientation="yaw"))[1] is None
+    for turned in ("yaw", "pitch"):
+        assert most(tool(standing(), law(), orientation=turned))[1] is None
     along = np.array([0.6, 0.0, 0.8])
     corner = POSE[:3, 3] + 0.1 * along
     segments = [Line(POSE[:3, 3] - REST * along, corner), Line(corner, corner + np.array([0, 0.5, 0]))]
@@ -362,6 +363,10 @@ def test_a_slide_is_as_long_as_it_stands() -> None:
     path = ToolPath(line(), WHOLE, "none")
     _, ((highest, _),) = path_bound._values_at_nodes(polar, path, coefficients, np.array([1e-6]))
     assert 1 - 1e-12 <= highest * math.factorial(9) / (5.0 * 2.0**9) <= 10.0
+    each = np.repeat(coefficients, 3, axis=1)
+    each[1, :, 1] = [0.5, 5.0, 1.0]
+    _, highest = path_bound._values_at_nodes(polar, path, each, np.full(3, 1e-6))
+    assert highest[1, 0] * math.factorial(9) / (5.0 * 2.0**9) >= 1 - 1e-12  # in whichever piece
     coefficients[0, 0, :2] = [0.0, 2.0]  # and what slides turns nothing
     _, ((_, highest),) = path_bound._values_at_nodes(
         polar, replace(path, orientation="all"), coefficients, np.array([1e-6])
@@ -395,3 +400,92 @@ def test_the_curve_of_the_joints_may_begin_at_any_time() -> None:
     moved = replace(each, trajectory=replace(each.trajectory, curve=later))
     assert most(moved)[0] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
     assert most(moved) == pytest.approx(most(each), rel=1e-9)
+
+
+@pytest.mark.parametrize("past", [1e-6, -1e-6])
+def test_a_law_past_an_end_of_its_path_is_at_that_end(past: float) -> None:
+    """By a hundred thousandth of a path: the reference on rows stays at the end, and so does that of the bound."""
+    along, rest = np.array([0.6, 0.0, 0.8]), REST if past > 0 else 0.0
+    curve = Line(POSE[:3, 3] - rest * along, POSE[:3, 3] + (REST - rest) * along)
+    poses = PoseCurve(curve, FixedOrientation(POSE[:3, :3], curve.length))
+    one = np.array([0.0, 1.0])
+    each = tool(
+        PiecewisePolynomial(one, Q[None, None]),
+        PiecewisePolynomial(one, np.full((1, 1, 1), rest + past)),
+        poses,
+    )
+    assert max(sizes.max() for sizes in each.deviation) < 1e-12
+    assert most(each) == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_ends_that_rounding_moves_apart_prove_as_much(sign: int) -> None:
+    """Of three seconds the joints end 2.5e-12 behind the move, the law as much before it, or the other way."""
+    each = tool(standing(0, 1.5 * TOLERANCE / float(np.hypot(*POSE[:2, 3]))), law())
+    ends = (np.array([0.0, 1.0, 2.0, 3.0 + side * 2.5e-12]) for side in (sign, -sign))
+    joints, along = (
+        PiecewisePolynomial(breaks, curve.coefficients)
+        for breaks, curve in zip(ends, (each.trajectory.curve, each.motion.law), strict=True)
+    )
+    motion = replace(each.motion, law=along, breaks=along.breaks)
+    beside = replace(each, trajectory=replace(each.trajectory, curve=joints), motion=motion)
+    assert most(beside)[0] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+
+
+def test_a_move_of_no_length_is_left_to_its_rows() -> None:
+    each = tool(standing(), law())
+    motion = replace(each.motion, law=constant([REST], 0.0), breaks=np.zeros(1))
+    for time in (0.0, 1.0):
+        still = replace(each, span=replace(each.span, start=time, end=time), motion=motion)
+        assert still.bounds == (None, None)
+        assert max(sizes.max() for sizes in still.deviation) < 1e-12
+
+
+@pytest.mark.parametrize("units", [-2, 2])
+@pytest.mark.parametrize("of_law", [False, True])
+def test_breaks_beside_each_other_by_rounding_are_of_the_pieces_behind_them(of_law: bool, units: int) -> None:
+    """Joints and law change a few units in the last place apart: the bump behind is in one of them alone."""
+    joints = standing() if of_law else standing(0, 1.5 * TOLERANCE / float(np.hypot(*POSE[:2, 3])))
+    along = law(1.5 * TOLERANCE if of_law else 0.0)
+    breaks = joints.breaks + units * np.spacing(1.0) * np.array([0.0, 1.0, 1.0, 0.0])
+    each = tool(PiecewisePolynomial(breaks, joints.coefficients), along)
+    assert most(each)[0] == pytest.approx(1.5 * TOLERANCE, rel=4e-3)
+
+
+def ninth(angle: float, length: float) -> float:
+    """Return |c_9| of the Taylor series of exp(i angle (t / length)^4) about t = length, by that of the exponent."""
+    rising = 1j * angle * np.array([0.0, 4, 6, 4, 1]) / length ** np.arange(5)
+    terms = (np.polynomial.polynomial.polypow(rising, k) / math.factorial(k) for k in range(3, 10))
+    return abs(sum(term[9] for term in terms))
+
+
+@pytest.mark.parametrize("length", [0.01, 100.0])
+def test_ninth_derivatives_are_bounded_where_a_piece_is_fastest(length: float) -> None:
+    """By three radians with the fourth power of the time: of a circle about an axis it is largest at the end."""
+    true = ninth(3.0, length)
+    coefficients = np.zeros((5, 1, 7))
+    coefficients[-1, 0, :6], lengths = Q, np.array([length])
+    for joint, orientation in ((0, "all"), (5, "all"), (4, "direction")):
+        rows = coefficients.copy()
+        rows[0, 0, joint] = 3.0 / length**4
+        path = ToolPath(line(), WHOLE, orientation)  # type: ignore[arg-type]
+        _, ((far, turned),) = path_bound._values_at_nodes(ROBOT, path, rows, lengths)
+        assert true <= turned <= 10.0 * true
+        if joint == 0:
+            lever = float(np.hypot(*POSE[:2, 3]))
+            assert lever * true <= far <= 50.0 * lever * true
+    circle = (np.array([math.cos(angle), math.sin(angle), 0.0]) for angle in (0.0, 1.5, 3.0))
+    arc = Arc.through(*(0.1 * each for each in circle))
+    path = ToolPath(PoseCurve(arc, FixedOrientation(POSE[:3, :3], arc.length)), WHOLE, "all")
+    coefficients[0, 0, -1] = 0.3 / length**4
+    assert 0.1 * true <= path_bound._of_path(path, lengths, coefficients)[0, 9, 0] <= 1.0 * true
+
+
+def test_a_tool_that_turns_against_its_path_differs_by_both() -> None:
+    """Two turns at one rate, the one against the other: the ninth derivative of their difference is twice rate^9."""
+    rate = 2.0
+    coefficients = np.zeros((2, 1, 7))
+    coefficients[0, 0, 5:], coefficients[1, 0] = [rate, -rate], [*Q, REST]
+    path = ToolPath(turning(), WHOLE, "all")
+    _, ((_, highest),) = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
+    assert 2.0 <= highest * math.factorial(9) / rate**9 <= 2.5
