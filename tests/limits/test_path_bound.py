@@ -489,3 +489,10 @@ def test_a_tool_that_turns_against_its_path_differs_by_both() -> None:
     path = ToolPath(turning(), WHOLE, "all")
     _, ((_, highest),) = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
     assert 2.0 <= highest * math.factorial(9) / rate**9 <= 2.5
+
+
+def test_a_move_that_starts_within_a_piece_of_its_joints_is_not_proven() -> None:
+    each = tool(standing(), law())
+    along = PiecewisePolynomial(np.array([0.0, 0.7, 1.7, 2.7]), law().coefficients)
+    late = replace(each, span=replace(each.span, start=0.3), motion=replace(each.motion, law=along))
+    assert late.bounds == (None, None)
