@@ -211,3 +211,24 @@ def test_findings_are_told_errors_first_and_by_their_times(order: int) -> None:
     profile = SimpleNamespace(rules=[SimpleNamespace(id=rule) for rule in "ab"])
     found = judgement_of(profile, checks).findings  # type: ignore[arg-type]
     assert [(each.rule, each.severity, each.time) for each in found] == told
+
+
+def test_every_rule_that_cannot_be_judged_is_told_with_its_reason() -> None:
+    """The first, one between and the last of them, in the order of the profile; findings of others stand beside."""
+    reasons = {"a": "no efforts", "b": None, "c": "no names", "d": None, "e": "no start"}
+    finding = Finding(rule="b", severity="error", kind="rule", value=1.0, limit=0.5, time=0.0, message="")
+    joints = [replace(finding, joint=name) for name in ("q2", "q1", None)]
+    checks = [
+        SimpleNamespace(
+            rule=SimpleNamespace(id=name, text="what it says"),
+            findings=lambda name=name: joints if name == "b" else [],
+            finish=lambda: None,
+            unjudged=reason,
+        )
+        for name, reason in reasons.items()
+    ]
+    profile = SimpleNamespace(rules=[check.rule for check in checks])
+    told = judgement_of(profile, checks)  # type: ignore[arg-type]
+    assert told.unjudged == (("a", "no efforts"), ("c", "no names"), ("e", "no start"))
+    assert [each.joint for each in told.findings] == [None, "q1", "q2"]
+    assert not told.accepted

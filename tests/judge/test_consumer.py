@@ -11,6 +11,7 @@ from trajcli.consumers.judgement import judge_by_profile, load_profile
 from trajcli.consumers.rule_check import Surroundings
 from trajcli.job.robot import load_robot
 from trajcli.judge.consumer import ConsumerJudge
+from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
@@ -106,3 +107,25 @@ def test_all_rules_of_a_profile_judge_every_row(profile: str, named: bool) -> No
         bare = ConsumerJudge(profile, replace(robot, limits=unlimited(7)), start)
         bare.take(rows)
         assert len(bare.result()[0]) < len(findings)  # no limit says that the way from the start is too short
+
+
+@pytest.mark.parametrize("row", [5, 350])
+@pytest.mark.parametrize("blocks", [3, 100, 400])
+def test_a_judgement_says_all_that_the_rules_of_its_consumer_say(blocks: int, row: int) -> None:
+    """Of each row, those that are seen before a period shows, too; and what cannot be judged."""
+    robot, rows = load_robot("fr3"), at_rest(400)
+    rows.q[row:, 3] -= 0.003
+    judge = ConsumerJudge("franka-fr3", robot, rows.q[0])
+    judge.take(rows)
+    findings, notes = judge.result()
+    assert "fr3-velocity" in {each.rule for each in findings}
+    assert len(notes) == 2
+    required = Requirements(
+        replace(robot, limits=unlimited(7)),
+        consumer=lambda: ConsumerJudge("franka-fr3", robot, rows.q[0]),
+    )
+    parts = [cut(rows, low, min(low + blocks, 400)) for low in range(0, 400, blocks)]
+    judgement = judge_motion(lambda: parts, required)
+    told = {(each.rule, each.joint, each.row) for each in judgement.findings}
+    assert {(each.rule, each.joint, each.row) for each in findings} <= told
+    assert judgement.notes[-2:] == notes

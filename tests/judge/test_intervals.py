@@ -35,7 +35,6 @@ def window_of(seed: int, **changes: object) -> Intervals:
         "resolution": Resolution(0.0, *off, relative=1e-5),
         "first": 0,
         "last": ROWS - 1,
-        "begins": True,
         "ends": True,
     }
     return Intervals(**(fields | changes))

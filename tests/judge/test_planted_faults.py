@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hermite_curves import hermite_pieces
-from recorded_rows import judged, part, rows_of
+from recorded_rows import bare_robot, judged, part, rows_of
 from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
 from trajcli.judge.judgement import Judgement
+from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Limits
-from trajcli.streams.recorded_motion import RecordedMotion
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 DURATION, DISTANCE = 2.0, 1.2
 PEAKS = (DISTANCE * 1.875 / DURATION, DISTANCE * 10 / 3**0.5 / DURATION**2, DISTANCE * 60 / DURATION**3)
@@ -329,3 +330,103 @@ def test_a_short_ramp_within_the_limit_is_no_jump(limit: float) -> None:
     motion = rows_of(PiecewisePolynomial(np.array([0.0, 0.101, 0.104, 0.3]), pieces), 0.01, decimals=9)
     judgement = judged(motion, limits(0.0, joints=1, velocity=9.0, acceleration=limit, jerk=np.inf))
     assert {each.kind for each in judgement.errors} == (set() if np.isfinite(limit) else {"jump"})
+
+
+@pytest.mark.parametrize("blocks", [None, 300, 7])
+@pytest.mark.parametrize(("share", "verdict"), [(0.95, "within rounding"), (1.1, "exceeded")])
+def test_stamps_of_no_period_explain_by_how_much_both_ends_of_an_interval_are_rounded(
+    share: float, verdict: str, blocks: int | None
+) -> None:
+    """Stamps are late and early by turns, 0.1 ms each, of rows that go at just 1 rad/s: in the last ones only."""
+    half = 1e-4
+    t = np.cumsum(np.random.default_rng(3).uniform(0.01, 0.03, 900))
+    off = np.where(np.arange(900) < 880, 0.0, share * half * (-1.0) ** np.arange(900))
+    rows = rows_of(quintic(1), 0.5, 1)
+    rows = replace(rows, t=t + off, q=t[:, None], resolution=Resolution(half, *3 * (np.zeros(1),)))
+    within = judged(rows, limits(joints=1, position=99.0, velocity=1.0), blocks)
+    assert within.verdict == verdict
+    assert within.period is None
+
+
+@pytest.mark.parametrize(("between", "told"), [(5, 0), (8, 0), (10, 39), (20, 39)])
+def test_longer_intervals_are_holes_where_there_are_nine_of_one_period_for_each(
+    between: int, told: int
+) -> None:
+    steps = np.array(([1] * between + [2]) * 40)
+    t = np.concatenate([[0.0], np.cumsum(steps)])[:-1] * 0.01
+    rows = replace(rows_of(quintic(1), 0.5, 1), t=t, q=np.zeros((len(t), 1)))
+    holes = [each for each in judged(rows, limits(joints=1)).findings if each.rule == "time"]
+    assert [each.count for each in holes] == ([told] if told else [])
+    assert [each.severity for each in holes] == ["warning"] * len(holes)
+
+
+def test_the_period_of_rows_one_of_which_is_missing_is_none() -> None:
+    rows = rows_of(quintic(1), 0.01, 1)
+    assert judged(rows, limits(joints=1)).period == pytest.approx(0.01)
+    kept = np.arange(len(rows.t)) != 77
+    assert judged(replace(rows, t=rows.t[kept], q=rows.q[kept]), limits(joints=1)).period is None
+
+
+def test_rows_that_name_no_move_have_the_limits_of_the_arm() -> None:
+    slow = bare_robot(limits(-0.5, 1))
+    rows = rows_of(quintic(1), 0.01, 3)
+    assert judged(rows, limits(joints=1), by_move={0: slow}).passed
+    of_first = replace(rows, move=np.zeros(len(rows.t), dtype=np.int64))
+    found = judged(of_first, limits(joints=1), by_move={0: slow}).findings
+    assert found
+    assert {each.move for each in found} == {0}
+    assert {each.move for each in judged(rows, limits(-0.5, 1)).findings} == {None}
+
+
+def test_the_velocity_of_a_single_row_moves_nothing() -> None:
+    """It is said that the motion does not end at rest; positions that do not follow from it there are none."""
+    rows = part(rows_of(quintic(1), 0.01, 3), slice(100, 101))
+    found = judged(rows, limits(joints=1))
+    assert (found.interpolation, found.passed) == ("hold", True)
+    assert [(each.rule, each.kind, each.severity) for each in found.findings] == [("state", "end", "warning")]
+
+
+@pytest.mark.parametrize("blocks", [None, 300])
+def test_rows_late_in_a_long_log_are_as_far_apart_as_their_period(blocks: int | None) -> None:
+    """After 100000 s at 1 kHz a stamp is rounded by a hundred-millionth of the period; rows go at 1 rad/s."""
+    steps = np.arange(900)
+    t = 1e5 + 1e-3 * steps
+    assert np.ptp(np.diff(t)) > 1e-11
+    rows = replace(rows_of(quintic(1), 0.5, 1), t=t, q=1e-3 * steps[:, None])
+    assert judged(rows, limits(joints=1, velocity=1.0), blocks).verdict == "satisfied"
+    (found,) = judged(rows, limits(-1e-8, joints=1, velocity=1.0), blocks).errors
+    assert (found.kind, found.certainty, found.value) == (
+        "velocity",
+        "exceeded",
+        pytest.approx(1.0, rel=1e-10),
+    )
+
+
+def test_positions_within_two_turns_do_not_look_like_degrees() -> None:
+    found = worst(judged(rows_of(quintic(), 0.01, 1), limits(0.5, position=1.0)), "position")
+    assert found.value == pytest.approx(DISTANCE)
+    assert "degrees" not in (found.hint or "")
+
+
+@pytest.mark.parametrize(("excess", "looks"), [(28.0, True), (2.0, False)])
+def test_velocities_far_over_their_limits_look_like_degrees(excess: float, looks: bool) -> None:
+    motion = rows_of(quintic(1), 0.01, 1)
+    motion = replace(motion, q=np.degrees(motion.q))
+    peak = np.abs(np.diff(motion.q[:, 0])).max() / 0.01
+    inf = dict.fromkeys(("position", "acceleration", "jerk"), np.inf)
+    found = worst(judged(motion, limits(joints=1, velocity=peak / excess, **inf)), "velocity")
+    assert ("degrees" in (found.hint or "")) is looks
+
+
+@pytest.mark.parametrize("sizes", [(60.0, 1.0), (1.0, 60.0)])
+def test_lengths_do_not_look_like_degrees(sizes: tuple[float, float]) -> None:
+    """A slide goes too far, or a joint without a range turns often: the other one of them is beyond its own range."""
+    motion = rows_of(quintic(2), 0.01, 1)
+    motion = replace(motion, q=motion.q * sizes)
+    wide = limits(joints=2, velocity=1e9, acceleration=1e9, jerk=1e9, position=0.5)
+    second = np.inf if sizes[1] > 1 else 0.5
+    bare = bare_robot(replace(wide, position=np.array([[-0.5, 0.5], [-second, second]])))
+    robot = replace(bare, joints=(replace(bare.joints[0], type="prismatic"), bare.joints[1]))
+    found = judge_motion(lambda: [motion], Requirements(robot)).findings
+    assert {each.kind for each in found} == {"position"}
+    assert not [each.hint for each in found if "degrees" in (each.hint or "")]

@@ -437,7 +437,16 @@ def test_wrong_velocities_of_one_joint_hide_no_wrong_accelerations_of_another() 
     assert found == {("j1", "velocity"), ("j3", "acceleration")}
 
 
-@pytest.mark.parametrize("blocks", [20, 257])
+def test_wrong_velocities_in_one_move_hide_no_wrong_accelerations_in_another() -> None:
+    rows = replace(waving(1), move=np.repeat([0, 1], [300, 301]))
+    rows.qd[:300] *= 1.5
+    rows.qdd[300:] *= 1.5
+    found = [each for each in judged_by(rows, unlimited(1)).findings if each.kind == "derivative"]
+    assert ("velocity", 0) in {(each.quantity, each.move) for each in found}
+    assert ("acceleration", 1) in {(each.quantity, each.move) for each in found}
+
+
+@pytest.mark.parametrize("blocks", [20, 256, 257])
 def test_what_changes_of_the_jerk_explain_is_the_same_in_blocks(blocks: int) -> None:
     """300 of them between 901 dense rows: on both sides of a piece two others tell of one, beside a block's end too."""
     rng = np.random.default_rng(1)

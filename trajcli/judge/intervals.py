@@ -44,7 +44,6 @@ class Intervals:
         resolution: Rounding of the values.
         first: Index of the first interval to judge.
         last: Index of the one after the last.
-        begins: Whether the first row is the first of the file.
         ends: Whether the last row is the last one.
     """
 
@@ -58,7 +57,6 @@ class Intervals:
     resolution: Resolution
     first: int
     last: int
-    begins: bool
     ends: bool
 
     @cached_property

@@ -137,7 +137,7 @@ class MotionJudge:
         self._stamps: Stamps | None = None
         self._interpolation: Interpolation = "linear"
         self._kept: _Rows | None = None
-        self._judged, self._count, self._begins = 0, 0, True
+        self._judged, self._count = 0, 0
         self._last_stamp, self._waiting = -np.inf, list[RecordedMotion]()
         self._first_state: _Rows | None = None
         self._resolution: Resolution | None = None
@@ -268,7 +268,6 @@ class MotionJudge:
                 self._tool.see(window, pieces, robot, before, asked=asked)
         gone = max(last - BESIDE, 0)
         self._kept, self._judged = kept.part(slice(gone, None)), last - gone
-        self._begins = self._begins and gone == 0
 
     def _see_holes(self, window: Intervals) -> None:
         """Note intervals of two periods and more, and count those of one."""
@@ -315,7 +314,6 @@ class MotionJudge:
             resolution=self._resolution,
             first=self._judged,
             last=last,
-            begins=self._begins,
             ends=ends,
         )
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from trajcli.curves.extrema import peaks
-from trajcli.errors import PlanningError
+from trajcli.errors import MissingLimitError, PlanningError
 from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import FixedOrientation
 from trajcli.geometry.paths.pose import PoseCurve
@@ -29,6 +32,7 @@ PATHS = {
     "turning unevenly": PathDerivatives(True, 0.0, 3.0, 40.0),
     "in place": PathDerivatives(False, 0.0, 1.0, 0.0),
 }
+IN_PLACE = PATHS["in place"]
 
 
 def used_by(bounds: PathBounds, path: PathDerivatives) -> dict[str, float]:
@@ -152,10 +156,12 @@ def test_a_smooth_law_has_no_breaks_but_its_ends(shape: str) -> None:
     assert made.breaks.tolist() == [0.0, 4.0]
 
 
-def cornered() -> ToolPath:
-    """Return a path of 0.3 m, then 0.6 m square to it: a law stops between."""
-    corner = np.array([0.3, 0.0, 0.0])
-    lines = [Line(np.zeros(3), corner), Line(corner, corner + np.array([0.0, 0.6, 0.0]))]
+def cornered(*more: float) -> ToolPath:
+    """Return a path of 0.3 m, then 0.6 m square to it, then steps of such lengths: a law stops between."""
+    places = np.zeros((3 + len(more), 3))
+    places[1:, 0], places[2:, 1] = 0.3, 0.6
+    places[3:, 2] = np.cumsum(more)
+    lines = [Line(a, b) for a, b in pairwise(places)]
     chain = join(lines)
     return ToolPath(PoseCurve(chain, FixedOrientation(np.eye(3), chain.length)), (True,) * 3, "all")
 
@@ -184,3 +190,155 @@ def test_a_law_over_two_segments_stops_between_them(shape: str, fields: dict[str
     if made.phases:
         assert made.phases[-1].end == pytest.approx(whole)
         assert min(abs(phase.start - halt) for phase in made.phases) < 1e-9
+
+
+@pytest.mark.parametrize("deceleration", [None, 1.0])
+def test_a_rotation_in_place_ends_at_rest_whatever_deceleration_of_the_tool_its_law_names(
+    deceleration: float | None,
+) -> None:
+    """0.8 rad in 3 s at 0.4 rad/s: the ramps take what 2 s of cruise leave, 1 s each; a length slows down no angle."""
+    spec = LawSpec(duration=3.0, angular_speed=0.4, deceleration=deceleration)
+    bounds, _ = law_bounds(spec, ToolLimits(**TOOL), IN_PLACE, "line")
+    law = LAWS["trapezoid"].segment(spec, 0.8, bounds, 3.0).law
+    assert law.breaks == pytest.approx([0.0, 1.0, 2.0, 3.0])
+    assert float(law.evaluate(3.0, 1)[0]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_an_acceleration_that_a_law_names_of_a_rotation_is_that_of_both_ramps() -> None:
+    spec = LawSpec(angular_acceleration=2.5, deceleration=1.0)
+    bounds, _ = law_bounds(spec, ToolLimits(**TOOL), IN_PLACE, "line")
+    assert (bounds.speed, bounds.acceleration, bounds.deceleration) == (TOOL["angular_speed"], 2.5, 2.5)
+
+
+@pytest.mark.parametrize(
+    ("fields", "speed", "ramps"),
+    [
+        ({"shape": "trapezoid"}, math.inf, 2.0),
+        ({"shape": "trapezoid", "acceleration": 0.4}, math.inf, 0.4),
+        ({"shape": "trapezoid", "speed": 0.9}, 0.9, math.inf),
+        ({"shape": "quintic"}, math.inf, math.inf),
+        ({"shape": "quintic", "speed": 0.9}, 0.9, math.inf),
+    ],
+)
+def test_limits_lower_nothing_of_a_law_with_a_duration_but_say_ramps(
+    fields: dict[str, float], speed: float, ramps: float
+) -> None:
+    """A trapezoid is found from its duration and either its speed or its ramps; others from the duration alone."""
+    spec = LawSpec(duration=3.0, **fields)
+    bounds, ruled = law_bounds(spec, ToolLimits(**TOOL), PATHS["straight"], "line")
+    assert (bounds.speed, *bounds.by_order[1:2], ruled) == (speed, ramps, None)
+
+
+def test_a_trapezoid_with_a_duration_needs_a_speed_or_ramps() -> None:
+    for name, asked in (("straight", "acceleration"), ("in place", "angular_acceleration")):
+        with pytest.raises(MissingLimitError) as refused:
+            law_bounds(LawSpec(duration=3.0), ToolLimits(speed=0.7), PATHS[name], "line")
+        (problem,) = refused.value.problems
+        own = asked.replace("acceleration", "speed")
+        assert f"{{tcp: {{{asked}: ...}}}}" in problem.hint
+        assert problem.hint.endswith(f"`{asked}` or a `duration` or `{own}` to the `law`") or (
+            problem.hint.endswith(f"`{asked}` or `{own}` to the `law`")
+        )
+
+
+@pytest.mark.parametrize(("unit", "prefix"), [("length", ""), ("angle", "angular_")])
+@pytest.mark.parametrize("by", ["speed", "acceleration"])
+def test_a_trapezoid_that_does_not_exist_is_told_what_it_may_have(by: str, unit: str, prefix: str) -> None:
+    """Over L in T: a cruise between L / T, that of a rectangle, and twice that, or ramps of 4 L / T^2 and more."""
+    length, duration = 2 / 3, 2.0
+    own = {"speed": 0.3, "acceleration": 0.5}[by]
+    bounds = PathBounds(own if by == "speed" else math.inf, *(2 * (own,)), math.inf, unit)
+    with pytest.raises(PlanningError) as refused:
+        LAWS["trapezoid"].segment(LawSpec(duration=duration), length, bounds, duration)
+    (problem,) = refused.value.problems
+    amounts = problem.amounts
+    assert {amounts[key].dimension for key in ("length", "given", "low")} == {unit}
+    assert (amounts["given"].value, amounts["given"].order) == (own, 1 if by == "speed" else 2)
+    least = length / duration if by == "speed" else 4 * length / duration**2
+    assert (amounts["low"].value, amounts["low"].rounded) == (pytest.approx(least), "up")
+    if by == "speed":
+        assert (amounts["high"].value, amounts["high"].rounded) == (pytest.approx(2 * least), "down")
+    assert ("at most" in problem.text()) == (by == "speed")
+    assert f"`{prefix}{by}`" in problem.hint
+
+
+FLAWS = [
+    ({"shape": "cubic"}, {"duration": 2.0}, {"minimum_duration": 1.0}, "exclude each other"),
+    ({"deceleration": 1.0}, {"shape": "trapezoid"}, {"shape": "cubic"}, "slows down as it speeds up"),
+    ({"jerk": 5.0}, {"shape": "quintic"}, {"shape": "trapezoid"}, "cannot be limited"),
+    ({"duration": 2.0}, {"shape": "cubic"}, {"shape": "jerk_limited"}, "as short as its limits allow"),
+    ({"duration": 2.0, "speed": 0.2}, {}, {"acceleration": 1.0}, "ask too much"),
+]
+
+
+@pytest.mark.parametrize(("fields", "right", "wrong", "said"), FLAWS)
+def test_fields_of_a_law_that_do_not_go_together_are_refused(
+    fields: dict[str, Any], right: dict[str, Any], wrong: dict[str, Any], said: str
+) -> None:
+    LawSpec(**fields, **right)
+    with pytest.raises(ValidationError, match=said):
+        LawSpec(**{**right, **fields, **wrong})
+
+
+@pytest.mark.parametrize(
+    ("fields", "may"),
+    [
+        ({}, True),
+        ({"speed": 0.2}, True),
+        ({"acceleration": 1.0}, True),
+        ({"speed": 0.2, "acceleration": 1.0}, False),
+        ({"shape": "cubic", "speed": 0.2, "acceleration": 1.0}, True),
+        ({"shape": "jerk_limited"}, False),
+    ],
+)
+def test_what_a_law_says_of_durations_is_what_it_accepts(fields: dict[str, Any], *, may: bool) -> None:
+    assert LawSpec(**fields).takes_any_duration is may
+    if may:
+        assert LawSpec(**fields, duration=2.0).duration == 2.0
+    else:
+        with pytest.raises(ValidationError):
+            LawSpec(**fields, duration=2.0)
+
+
+@pytest.mark.parametrize(("name", "prefix"), [("straight", ""), ("in place", "angular_")])
+@pytest.mark.parametrize("shape", ["cubic", "quintic", "cycloidal"])
+def test_a_law_that_nothing_bounds_asks_for_a_speed(shape: str, name: str, prefix: str) -> None:
+    with pytest.raises(MissingLimitError) as refused:
+        law_bounds(LawSpec(shape=shape), ToolLimits(), PATHS[name], "line")
+    (problem,) = refused.value.problems
+    assert f"limits: {{tcp: {{{prefix}speed: ...}}}}" in problem.hint
+    assert problem.hint.endswith("or a `duration` to the `law`")
+
+
+def test_the_jerk_of_a_rotation_in_place_is_no_limit_that_somebody_could_give() -> None:
+    with pytest.raises(MissingLimitError, match="a rotation in place has no limit of it"):
+        law_bounds(LawSpec(shape="jerk_limited"), ToolLimits(**TOOL), IN_PLACE, "line")
+    slower = {name: value for name, value in TOOL.items() if name != "speed"}
+    with pytest.raises(MissingLimitError) as refused:
+        law_bounds(LawSpec(shape="jerk_limited"), ToolLimits(**slower), PATHS["straight"], "line")
+    assert "duration" not in refused.value.problems[0].hint
+
+
+@pytest.mark.parametrize("shape", ["trapezoid", "cubic"])
+def test_each_of_three_segments_begins_when_the_one_before_ends(shape: str) -> None:
+    made, _ = law_along(cornered(0.2), LawSpec(shape=shape), ToolLimits(**TOOL), "polyline")
+    alone = [
+        LAWS[shape].segment(LawSpec(shape=shape), length, PathBounds(0.7, 2.0, 2.0, 30.0), None)
+        for length in (0.3, 0.6, 0.2)
+    ]
+    ends = np.cumsum([each.law.duration for each in alone])
+    reached = made.law.evaluate(ends)[:, 0]
+    assert reached == pytest.approx([0.3, 0.9, 1.1])
+    np.testing.assert_allclose(np.abs(made.breaks[:, None] - ends).min(axis=0), 0.0, atol=1e-9)
+    assert (np.diff(made.breaks) > 0).all()
+    times = [(phase.start, phase.end) for phase in made.phases]
+    for (_, end), (start, _) in pairwise(times):
+        assert start == pytest.approx(end)
+
+
+def test_a_minimum_duration_makes_no_law_faster() -> None:
+    fastest, _ = law_along(cornered(), LawSpec(), ToolLimits(**TOOL), "polyline")
+    for share, lasts in ((0.5, 1.0), (1.0, 1.0), (1.5, 1.5)):
+        spec = LawSpec(minimum_duration=share * fastest.law.duration)
+        made, _ = law_along(cornered(), spec, ToolLimits(**TOOL), "polyline")
+        assert made.law.duration == pytest.approx(lasts * fastest.law.duration, rel=1e-12)

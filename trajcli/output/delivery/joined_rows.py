@@ -359,7 +359,6 @@ class JoinedRows:
             resolution=Resolution(0.0, rounding, rounding, rounding),
             first=0,
             last=lengths.size,
-            begins=False,
             ends=False,
             stated=states.transpose(2, 0, 1, 3),
             moves_after=moves[1],

@@ -141,7 +141,7 @@ class TrapezoidLaw(TimeLaw):
         from trajcli.curves import trapezoid
 
         both = trapezoid.MotionBounds(bounds.speed, bounds.acceleration, bounds.deceleration)
-        slowing = None if spec.deceleration is None else bounds.deceleration
+        slowing = bounds.deceleration if spec.deceleration and bounds.unit == "length" else None
         try:
             if duration is None:
                 profile = trapezoid.fastest_profile(length, 0.0, 0.0, both, both)
@@ -415,7 +415,7 @@ def _rotation_bounds(spec: LawSpec, limits: ToolLimits, derivatives: PathDerivat
         return PathBounds(math.inf, math.inf, math.inf, math.inf)
     speed = _or(spec.angular_speed, limits.angular_speed) / derivatives.turning
     acceleration = _or(spec.angular_acceleration, limits.angular_acceleration)
-    if derivatives.turning_change > 0 and math.isfinite(acceleration):
+    if derivatives.turning_change > 0:
         speed = min(speed, math.sqrt(_ACROSS * acceleration / derivatives.turning_change))
         acceleration *= _ALONG / 3  # w'' need not be perpendicular to w': sizes add up
     both = acceleration / derivatives.turning
