@@ -206,6 +206,7 @@ def profile_of_speed(
     duration: float,
     speed: float,
     deceleration: float | None = None,
+    acceleration: float = math.inf,
 ) -> VelocityProfile:
     """Return the profile over a positive `distance` that lasts `duration` with cruise speed `speed`.
 
@@ -213,7 +214,8 @@ def profile_of_speed(
     given. Boundary speeds are not negative, and not above the cruise speed.
 
     Raises:
-        InfeasibleProfileError: "speed", when it lies outside the interval that the duration allows.
+        InfeasibleProfileError: "speed", when it lies outside the interval that the duration allows;
+            "acceleration", when speeding up takes more than that.
     """
     low, high = _speeds_of_duration(distance, initial, final, duration, deceleration)
     surplus = speed * duration - distance
@@ -227,6 +229,8 @@ def profile_of_speed(
     if not above or speed > high * (1 + _ROUNDING) or weight == 0:
         raise InfeasibleProfileError("speed", max(low, initial, final), high)
     inverse = surplus / weight
+    if acceleration * inverse * (1 + _ROUNDING) < 1.0:
+        raise InfeasibleProfileError("acceleration", 1.0 / inverse)
     rise = (speed - initial) * inverse
     fall = (speed - final) * inverse if deceleration is None else (speed - final) / deceleration
     return _three(initial, speed, final, rise, fall, duration)

@@ -135,6 +135,22 @@ def test_a_duration_below_the_shortest_is_refused(shape: str) -> None:
         LAWS[shape].segment(LawSpec(shape=shape), 0.7, bounds, shortest * (1 - 1e-6))
 
 
+def test_a_trapezoid_of_a_speed_and_a_duration_speeds_up_no_faster_than_its_law_says() -> None:
+    """0.8 rad in 3 s at 0.27 rad/s: ramps of 3 s - 0.8 / 0.27 s each, of 7.29 rad/s^2."""
+    needed = 0.27 / (3.0 - 0.8 / 0.27)
+    spec = LawSpec(duration=3.0, angular_speed=0.27)
+    bounds = PathBounds(0.27, needed, needed, math.inf, "angle")
+    law = LAWS["trapezoid"].segment(spec, 0.8, bounds, 3.0).law
+    assert law.end == pytest.approx(3.0)
+    assert law.evaluate(law.end)[0] == pytest.approx(0.8)
+    with pytest.raises(PlanningError) as refused:
+        LAWS["trapezoid"].segment(spec, 0.8, replace(bounds, acceleration=0.999 * needed), 3.0)
+    (problem,) = refused.value.problems
+    assert problem.amounts["low"].value == pytest.approx(needed)
+    assert problem.hint is not None
+    assert "`angular_acceleration`" in problem.hint
+
+
 def test_a_refusal_says_what_the_law_would_reach() -> None:
     """A quintic over 0.6 m in 0.4 s: 15/8 of 1.5 m/s, which is allowed, and 10 / sqrt(3) of 3.75 m/s^2, which is not."""
     bounds = PathBounds(9.0, 5.0, 5.0, 900.0)
