@@ -146,8 +146,8 @@ class TrapezoidLaw(TimeLaw):
             if duration is None:
                 profile = trapezoid.fastest_profile(length, 0.0, 0.0, both, both)
             elif math.isfinite(bounds.speed):
-                speed, most = bounds.speed, bounds.acceleration
-                profile = trapezoid.profile_of_speed(length, 0.0, 0.0, duration, speed, slowing, most)
+                speed, steepest = bounds.speed, bounds.acceleration
+                profile = trapezoid.profile_of_speed(length, 0.0, 0.0, duration, speed, slowing, steepest)
             else:
                 profile = _triangle(length, both, duration) or trapezoid.profile_of_duration(
                     length, 0.0, 0.0, duration, both, both
