@@ -151,6 +151,21 @@ def test_a_trapezoid_of_a_speed_and_a_duration_speeds_up_no_faster_than_its_law_
     assert "`angular_acceleration`" in problem.hint
 
 
+@pytest.mark.parametrize(
+    ("named", "hint"),
+    [
+        ({"speed": 0.27, "angular_acceleration": 1.0}, "change `angular_acceleration` or"),
+        ({"angular_speed": 0.27, "acceleration": 1.0}, "change `acceleration` or"),
+    ],
+)
+def test_a_refused_trapezoid_names_the_field_that_the_law_has(named: dict[str, float], hint: str) -> None:
+    """On a path that moves and turns either may be what is too low."""
+    spec = LawSpec(duration=3.0, **named)
+    with pytest.raises(PlanningError) as refused:
+        LAWS["trapezoid"].segment(spec, 0.8, PathBounds(0.27, 1.0, 1.0, math.inf), 3.0)
+    assert str(refused.value.problems[0].hint).startswith(hint)
+
+
 def test_a_refusal_says_what_the_law_would_reach() -> None:
     """A quintic over 0.6 m in 0.4 s: 15/8 of 1.5 m/s, which is allowed, and 10 / sqrt(3) of 3.75 m/s^2, which is not."""
     bounds = PathBounds(9.0, 5.0, 5.0, 900.0)

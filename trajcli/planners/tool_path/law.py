@@ -153,7 +153,7 @@ class TrapezoidLaw(TimeLaw):
                     length, 0.0, 0.0, duration, both, both
                 )
         except trapezoid.InfeasibleProfileError as error:
-            raise _no_trapezoid(error, length, bounds, duration or 0.0) from None
+            raise _no_trapezoid(error, spec, length, bounds, duration or 0.0) from None
         law = profile.curve(0.0, length, duration)
         return LawSegment(law, law.breaks, tuple(Phase(*phase) for phase in profile.phases()))
 
@@ -173,7 +173,7 @@ def _triangle(length: float, bounds: MotionBounds, duration: float) -> VelocityP
 
 
 def _no_trapezoid(
-    error: InfeasibleProfileError, length: float, bounds: PathBounds, duration: float
+    error: InfeasibleProfileError, spec: LawSpec, length: float, bounds: PathBounds, duration: float
 ) -> PlanningError:
     order = {"speed": 1, "acceleration": 2}.get(error.reason)
     amounts = {"length": Amount(length, 0, None, bounds.unit), "duration": Amount(duration)}
@@ -188,7 +188,8 @@ def _no_trapezoid(
     amounts["high"] = Amount(error.high, order, None, bounds.unit, "down")
     allowed = "above {low} and at most {high}" if math.isfinite(error.high) else "at least {low}"
     message = f"a trapezoid over {{length}} in {{duration}} cannot have {{given}}: it must be {allowed}"
-    angular = "angular_" if bounds.unit == "angle" else ""
+    turns = getattr(spec, error.reason) is None and getattr(spec, f"angular_{error.reason}") is not None
+    angular = "angular_" if turns or bounds.unit == "angle" else ""
     hint = f"change `{angular}{error.reason}` or `duration` of the `law`"
     return PlanningError(Problem(message, hint, amounts=amounts))
 
