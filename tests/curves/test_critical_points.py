@@ -115,3 +115,37 @@ def test_how_long_a_curve_that_crosses_three_times_is_above() -> None:
     coefficients[-1, :, 1] = 3.0, 2.0
     times = durations_above(coefficients, np.array([1.0, 0.5]), np.array([-2.0, 3.0]))
     np.testing.assert_allclose(times, [[0.35, 1.0], [0.3, 0.0]], atol=1e-11)
+
+
+@SIGNS
+@pytest.mark.parametrize("length", [0.2, 1.0, 3.0])
+@pytest.mark.parametrize(
+    "turns", [[-0.5, 0.5], [-0.7, -0.2], [1.5, 3.0], [-0.4, 0.3, 2.0], [-0.4, -0.1, 0.3, 0.9]]
+)
+def test_points_stay_within_their_piece_and_in_order(turns: list[float], length: float, sign: float) -> None:
+    for found in critical_points(with_turns(turns, length, sign), np.array([length]), (0, 1)):
+        assert ((found >= 0.0) & (found <= length)).all()
+        assert (np.diff(found, axis=0) >= 0.0).all()
+
+
+@SIGNS
+@pytest.mark.parametrize(
+    "coefficients",
+    [
+        [0.4, 0.3, 0.4, -0.7, 0.3],
+        [-0.1, 0.0, 2.0, -2.8, -0.6],
+        [0.3, -0.8, -0.6, 1.2, -0.7],
+        [-0.3, 0.6, 1.0, -1.5, -0.2, -0.9],
+        [0.2, -1.4, 1.1, 2.2, -0.5, -0.3, -1.7, -1.0],
+    ],
+)
+def test_a_root_that_is_met_is_not_left_again(coefficients: list[float], sign: float) -> None:
+    """Where a value is none but for rounding, Newton's next step may be no smaller than the one before it."""
+    rows = sign * np.array(coefficients)
+    found = piece_extremes(rows[:, None, None], np.ones(1), (0, 1, 2))
+    for order, (low, high) in enumerate(found):
+        derived = np.polyder(rows, order)
+        roots = np.roots(np.polyder(derived))
+        turns = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0) & (roots.real < 1)].real
+        values = np.polyval(derived, [0.0, 1.0, *turns])
+        assert (low[0, 0], high[0, 0]) == pytest.approx((values.min(), values.max()), rel=1e-12)

@@ -333,3 +333,61 @@ def test_many_intervals_are_looked_at_in_blocks_and_need_little_memory() -> None
         assert found[k][0].low[0] == pytest.approx(values.min(), abs=1e-5)
         assert found[k][0].high[0] == pytest.approx(values.max(), abs=1e-5)
         assert k <= found[k][0].high_time[0] <= k + 1
+
+
+@pytest.mark.parametrize("bound", ["start", "end"])
+def test_an_interval_may_begin_or_end_at_zero(bound: str) -> None:
+    """The straight line x = t from -1 to 1: half of it, not the whole."""
+    curve = PiecewisePolynomial(np.array([-1.0, 1.0]), np.array([1.0, -1.0])[:, None, None])
+    (found,) = peaks(curve, (0,), **{bound: 0.0})
+    assert (found.low[0], found.high[0]) == ((0.0, 1.0) if bound == "start" else (-1.0, 0.0))
+
+
+def test_a_slice_of_intervals_has_those_that_it_names() -> None:
+    curve = PiecewisePolynomial(np.arange(6.0), np.arange(5.0)[None, :, None])
+    found = peaks_between(curve, [(k, k + 1.0) for k in range(5)], (0,))
+    for chosen in (slice(1, None), slice(None, None, -2), slice(-2, None)):
+        assert [each.high[0] for (each,) in found[chosen]] == list(range(5))[chosen]
+
+
+@pytest.mark.parametrize("rise", [10.0, -10.0])
+def test_each_of_many_intervals_has_its_own_level(rise: float) -> None:
+    """On each step of a staircase a bump up beside what is lower by 2, and a bump down beside what is higher.
+
+    The bump is 4 u (1 - u): all that is high on one step is low on the next, so that no other step tells.
+    """
+    count, signs = 50, np.array([1.0, -1.0])
+    coefficients = np.zeros((3, count, 2, 2))  # two pieces for each step
+    coefficients[-1] = rise * np.arange(count)[:, None, None]
+    coefficients[-1, :, 1] -= 2.0 * signs
+    coefficients[:, :, 0] += np.array([-4.0, 4.0, 0.0])[:, None, None] * signs
+    curve = PiecewisePolynomial(np.arange(2 * count + 1.0), coefficients.reshape(3, -1, 2))
+    found = peaks_between(curve, [(2.0 * k, 2.0 * k + 2.0) for k in range(count)], (0,))
+    for k, (each,) in enumerate(found):
+        np.testing.assert_allclose(each.low, rise * k + np.array([-2.0, -1.0]), atol=1e-9)
+        np.testing.assert_allclose(each.high, rise * k + np.array([1.0, 2.0]), atol=1e-9)
+
+
+@pytest.mark.parametrize("count", range(1, 10))
+def test_what_is_cut_for_memory_has_its_last_part_too(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts looked at by four: the last one may stand alone, and is itself a part of a piece."""
+    monkeypatch.setattr("trajcli.curves.extrema._PARTS", 4)
+    curve = PiecewisePolynomial(np.arange(count + 1.0), np.array([[1.0] * count, range(count)])[:, :, None])
+    (found,) = peaks(curve, (0,), 0.25, count - 0.5)
+    assert (found.low[0], found.high[0]) == (0.25, count - 0.5)
+    assert (found.low_time[0], found.high_time[0]) == (0.25, count - 0.5)
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-100, 1e100])
+def test_a_joint_has_its_peaks_whatever_the_size_of_the_others(size: float) -> None:
+    """x^3 / 3 - x^2 / 2 + 0.16 x turns at 0.2 and at 0.8; beside it the same of another size."""
+    cubic = np.array([1 / 3, -0.5, 0.16, 0.0])
+    curve = PiecewisePolynomial(
+        np.array([0.0, 1.0]), np.stack([cubic, size * cubic, -cubic], axis=1)[:, None]
+    )
+    (found,) = peaks(curve, (0,))
+    low, high = np.polyval(cubic, [0.8, 0.2])
+    np.testing.assert_allclose(found.high / [1.0, size, 1.0], [high, high, -low], rtol=1e-12)
+    np.testing.assert_allclose(found.low / [1.0, size, 1.0], [low, low, -high], rtol=1e-12)
+    np.testing.assert_allclose(found.high_time, [0.2, 0.2, 0.8], rtol=1e-9)
+    np.testing.assert_allclose(found.low_time, [0.8, 0.8, 0.2], rtol=1e-9)

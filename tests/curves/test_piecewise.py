@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, distinct, increasing
+from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant, distinct, increasing
 
 
 def drawn(seed, pieces):
@@ -67,8 +67,9 @@ def test_a_time_that_only_rounding_has_outside_is_the_border(scale):
     curve = PiecewisePolynomial([-scale, 0.0, 3.0 * scale], np.array([[[2.0], [1.0]], [[0.0], [5.0]]]))
     beyond = np.nextafter([-scale, 3.0 * scale], [-np.inf, np.inf])
     np.testing.assert_array_equal(curve.evaluate(beyond), curve.evaluate([-scale, 3.0 * scale]))
-    with pytest.raises(ValueError, match="outside the curve's domain"):
-        curve.evaluate(3.0 * scale * (1 + 1e-14))
+    for far in (3.0 * scale + 16 * np.spacing(3.0 * scale), -scale - 64 * np.spacing(scale)):
+        with pytest.raises(ValueError, match="outside the curve's domain"):
+            curve.evaluate(far)
 
 
 def test_joined_curves_are_each_other_after_another():
@@ -85,6 +86,58 @@ def test_joined_curves_are_each_other_after_another():
         rtol=1e-9,
         atol=1e-9,
     )
+
+
+def test_joined_curves_may_differ_in_degree_and_have_no_length():
+    """t from 0 to 1, nothing, and (1 - t^2) from 2 on: what has no length leaves no piece."""
+    line = PiecewisePolynomial([0.0, 1.0], np.array([1.0, 0.0])[:, None, None])
+    bent = PiecewisePolynomial([2.0, 4.0], np.array([-1.0, 0.0, 1.0])[:, None, None])
+    joined = concatenate([line, constant([7.0], 0.0), bent])
+    assert joined.breaks.tolist() == [0.0, 1.0, 3.0]
+    assert joined.evaluate([0.0, 0.5, 1.0, 2.0, 3.0])[:, 0].tolist() == [0.0, 0.5, 1.0, 0.0, -3.0]
+    back = concatenate([bent, line])
+    assert back.evaluate([2.0, 3.0, 4.0, 4.5])[:, 0].tolist() == [1.0, 0.0, 0.0, 0.5]
+    assert concatenate([constant([1.0], 0.0), constant([2.0], 0.0)]).evaluate(0.0).tolist() == [1.0]
+
+
+def test_a_curve_too_short_for_the_time_where_it_is_joined_keeps_a_piece():
+    line, short = constant([1.0], 1.0), constant([2.0], 1e-20)
+    joined = concatenate([line, short, line])
+    assert joined.pieces == 3
+    assert joined.breaks[:3].tolist() == [0.0, 1.0, np.nextafter(1.0, 2.0)]
+    assert joined.end == pytest.approx(2.0, rel=1e-15)
+
+
+def test_a_shifted_curve_is_later_and_the_same():
+    _, curve = drawn(8, 5)
+    later = curve.shifted(2.5)
+    t = np.linspace(curve.start, curve.end, 30)[1:-1]
+    np.testing.assert_allclose(later.evaluate(t + 2.5), curve.evaluate(t), rtol=1e-12, atol=1e-12)
+    far = PiecewisePolynomial([0.0, 1e-20, 1.0], np.zeros((1, 2, 1))).shifted(3.0)
+    assert far.breaks.tolist() == [3.0, np.nextafter(3.0, 4.0), 4.0]
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+def test_a_curve_does_not_change_with_the_arrays_that_made_it(frozen):
+    """Nor with one of which it was given a view that cannot be written to."""
+    breaks, rows = np.array([0.0, 1.0, 2.0]), np.ones((1, 2, 1))
+    given = [breaks[:], rows[:]] if frozen else [breaks, rows]
+    for each in given:
+        each.flags.writeable = not frozen
+    curve = PiecewisePolynomial(*given)
+    breaks[1], rows[:] = 1.5, 3.0
+    assert curve.breaks.tolist() == [0.0, 1.0, 2.0]
+    assert curve.evaluate(1.2).tolist() == [1.0]
+    with pytest.raises(ValueError, match="read-only"):
+        curve.breaks[0] = 5.0
+
+
+@pytest.mark.parametrize(
+    ("pieces", "shape"), [(2, (1, 3, 1)), (2, (1, 1, 1)), (2, (2, 2)), (2, (1, 1, 2, 1)), (1, (2,))]
+)
+def test_coefficients_of_another_number_of_pieces_are_refused(pieces, shape):
+    with pytest.raises(ValueError, match="do not fit"):
+        PiecewisePolynomial(np.arange(pieces + 1.0), np.ones(shape))
 
 
 def test_numbers_without_repeats_keep_those_that_differ_by_a_bit():
@@ -155,6 +208,8 @@ def test_ends_of_pieces_are_what_either_side_of_a_break_says():
         begins, ends = curve.piece_ends(order)
         np.testing.assert_allclose(begins, curve.evaluate(curve.breaks[:-1], order, side="right"), rtol=1e-12)
         np.testing.assert_allclose(ends, curve.evaluate(curve.breaks[1:], order, side="left"), rtol=1e-9)
+        for some in (slice(2, 4), slice(3, None), slice(None, 1)):
+            np.testing.assert_allclose(curve.piece_ends(order, some), [begins[some], ends[some]], rtol=1e-12)
 
 
 @pytest.mark.parametrize("count", [7, 8, 9, 13])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from fractions import Fraction
 from functools import cache
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,10 +22,12 @@ from trajcli.planners.flying_by import proven_bound
 from trajcli.planners.flying_by.proven_bound import (
     ShareBox,
     ShareProgramme,
+    _largest_refuted,
     is_provable,
     least_duration,
     moment_rows,
 )
+from trajcli.planners.flying_by.second_order import SAFE
 from trajcli.planners.flying_by.within_limits import FlownChain
 from trajcli.planning.plan import Plan, plan_job
 
@@ -259,6 +263,7 @@ def test_a_start_in_motion_and_bent_paths_have_no_proof() -> None:
     assert is_provable(two)
     assert not is_provable(replace(two, ends=(np.array([0.1, 0.0]), np.zeros(2))))
     assert not is_provable(replace(two, ends=(np.zeros(2), np.array([0.0, 0.1]))))
+    assert not is_provable(replace(two, courses=two.courses[:1], corners=()))
     three = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0], [0.2, 1.0], zone=0.02, more_zones=True)).chain
     assert not is_provable(three)
 
@@ -307,3 +312,75 @@ def test_of_two_hundred_random_programs_it_is_near(block: int, tally: Tally) -> 
     assert np.median(gaps) <= 0.01
     assert max(gaps) <= 0.03
     tally({"programs": len(gaps), "widest gap": max(gaps)})
+
+
+CORNERS = list(product((0, 1), repeat=2))  # of a box: whether the lowest or the largest share of either part
+
+
+@pytest.mark.parametrize("place", [(0.7, 0.2), (0.1, 0.6), (0.05, 0.1), (0.4, 0.45)])
+def test_the_search_goes_down_to_the_least_of_all_boxes(
+    place: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of durations that grow with the distance from a place, the least is at that place, in whatever half it is."""
+    chain = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0])).chain
+
+    def nearest(_: ShareProgramme, box: ShareBox, guess: float, longest: float) -> float:
+        assert guess <= longest
+        beyond = np.maximum(np.array(box.low) - place, place - np.array(box.high)).clip(0.0)
+        return 1.0 + float(beyond.sum())
+
+    monkeypatch.setattr(ShareProgramme, "least_duration", nearest)
+    monkeypatch.setattr(proven_bound, "_PROGRAMMES", ((0.0, 60),))
+    known = 1.2
+    found = least_duration(chain, known)
+    assert 1.0 - 1e-4 <= found < 1.0  # what rounding may have added is taken off
+
+
+@pytest.mark.parametrize("corner", CORNERS)
+def test_no_corner_of_a_box_refutes_a_motion_that_lies_there(corner: tuple[int, int]) -> None:
+    chain = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0]))
+    programme = ShareProgramme(chain.chain, 8, 6)
+    _, shares = states_of(chain, programme)
+    ends = [
+        (share - width, share) if upper else (share, share + width)
+        for share, width, upper in zip(shares[[0, 2]].tolist(), (0.1, 0.1), corner, strict=True)
+    ]
+    box = ShareBox((ends[0][0], ends[1][0]), (ends[0][1], ends[1][1]))
+    for guess in (0.5, 0.95, 1.0):
+        found = programme.least_duration(box, guess * chain.duration, 2 * chain.duration)
+        assert found <= chain.duration * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("upper", [0, 1])
+def test_at_the_least_share_of_a_part_its_rates_at_a_border_are_those_of_the_line(upper: int) -> None:
+    """The hull of w = h^k d u is exact at the least h, for k = 1 at the largest one too: no more and no less."""
+    chain = chain_of_plan(planned([0.9, 0.8], [0.2, 1.5], zone=0.05, limits=UNEQUAL))
+    programme = ShareProgramme(chain.chain, 2, 2)
+    box = ShareBox((0.2, 0.3), (0.3, 0.45))
+    outer = (box.low, box.high)[upper]
+    shares = outer[0], 1.0 - sum(outer), outer[1]
+    A, orders, sides = programme.rows(box)
+    A, allowed = A.toarray(), sides @ np.array([1.0, *outer])
+    for variable in programme.variables:
+        at_least = (variable.part == 1) == bool(upper)
+        for (border, slope), k in product(variable.slopes, (1, 2) if at_least else (1,)):
+            tied, state = variable.node(border) + k, programme.states + 2 * border + k - 1
+            rows = np.flatnonzero((A[:, tied] != 0) & (A[:, state] != 0))
+            assert set(orders[rows]) == {k}
+            low, high = programme.variables[-border].bounds[k - 1]
+            point = np.zeros(programme.columns)
+            point[state] = 0.3 * low + 0.7 * high
+            for off in (-1e-6, 0.0, 1e-6):
+                point[tied] = shares[variable.part] ** k * slope * point[state] + off
+                assert (A[rows] @ point <= allowed[rows] + 1e-12).all() == (off == 0.0)
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+def test_what_is_refuted_is_so_by_more_than_rounding(power: int) -> None:
+    """Of (T / 2)^k and a polynomial that lies below it: T is 2, less than 1 part in a million off."""
+    weights = np.zeros((4, 2))
+    weights[power] = 0.5**power, 0.25**power
+    found = _largest_refuted(weights, 8.0)
+    assert 2.0 * (1 - 1e-6) <= found
+    assert Fraction(found) ** power < 2**power * (1 - Fraction(SAFE) / 2)
+    assert _largest_refuted(weights, 1.5) == 1.5
