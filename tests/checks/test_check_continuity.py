@@ -384,3 +384,33 @@ def test_steps_count_from_the_start_of_the_curve() -> None:
     end = State(*(curve.piece_ends(k)[1][-1] for k in range(3)))
     whole = replace(trajectory(PiecewisePolynomial(curve.breaks - 3.0, rows), end=end), curve=curve)
     assert [step.time for step in steps_of(whole)] == [1.0]
+
+
+def test_a_step_between_two_accelerations_is_the_later_moves() -> None:
+    """t^3 up to 6 at 1 s, and from there with -6: both sides are none, whichever move comes first in the list."""
+    parts = [
+        PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0.0, 0.0, 0.0])[:, None, None]),
+        PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, -3.0, 3.0, 1.0])[:, None, None]),
+    ]
+    whole = trajectory(*parts)
+    assert [(s.move, s.time, s.size) for s in steps_of(whole)] == [(1, 1.0, pytest.approx(-12.0))]
+
+
+def test_moves_are_named_by_their_index_and_not_by_their_place() -> None:
+    plain = trajectory(between([0.0], [1.0]), *cubics(1.5, 2.0))
+    spans = tuple(replace(span, index=span.index + 3) for span in plain.spans)
+    whole = replace(plain, spans=spans)
+    assert [(f.move, f.kind) for f in check_continuity(whole, [FREE, LIMITED])] == [
+        (4, "position_jump"),
+        (4, "acceleration_jump"),
+    ]
+    assert [s.move for s in steps_of(whole)] == [4, 4]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("at_end", [True, False])
+def test_a_declared_state_that_is_no_number_is_not_met(value: float, at_end: bool) -> None:
+    plain = trajectory(between([0.0], [1.0]))
+    name = "end" if at_end else "start"
+    (found,) = check_continuity(replace(plain, **{name: state([value])}), [FREE])
+    assert (found.kind, found.time) == ("position_jump", 2.0 if at_end else 0.0)
