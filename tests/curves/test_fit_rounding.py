@@ -75,6 +75,40 @@ def test_noise_in_values_and_slopes_is_not_refined_away(order, width, level):
     assert curve.pieces == 40
 
 
+@pytest.mark.parametrize("probe", [0, 1, 2])
+def test_noise_is_explained_by_the_tolerance_of_where_it_is(probe):
+    """Pieces of which one place alone has a tolerance that noise exceeds: the others say nothing of that one."""
+    breaks = 1.0 + 1e-3 * np.arange(41)
+
+    def placed(places, side, guess):
+        values = noisy(places, side, guess).values
+        line = np.stack([places, np.ones_like(places), np.zeros_like(places)])
+        return Known(np.concatenate([values, line[..., None]], axis=2))
+
+    def misfit(known, rows, fitted):
+        within_piece = (known.values[0, rows, 1] - 1.0) / 1e-3 % 1.0
+        here = np.digitize(within_piece, [0.4, 0.6]) == probe
+        return np.abs(fitted - known.values[:, rows])[2, :, 0] / np.where(here, 1e-9, 1e3)
+
+    curve = fit(placed, misfit, breaks, lambda places: np.full((places.size, 2), 1.5))
+    assert curve.pieces == 40
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_noise_of_large_numbers_beside_small_ones_is_not_refined_away(order):
+    """A unit in the last place of 3000 is 2048 of those of 1.5; the column of these is met exactly."""
+    breaks = 1.0 + 1e-3 * np.arange(41)
+
+    def both(places, side, guess):
+        values = noisy(places, side, guess).values
+        large, small = 2048.0 * values, np.zeros_like(values)
+        small[0] = 1.5
+        return Known(np.concatenate([large, small][::order], axis=2))
+
+    curve = fit(both, within(1e-9), breaks, lambda places: np.full((places.size, 2), 1.5))
+    assert curve.pieces == 40
+
+
 @pytest.mark.parametrize("times", [1.1, 2.0])
 @pytest.mark.parametrize(
     ("order", "share"),

@@ -169,6 +169,26 @@ def test_pieces_that_are_worse_than_the_guess_are_no_guess():
     assert curve.pieces > 20
 
 
+@pytest.mark.parametrize("center", [1.5 - 0.3 * 5**0.5, 1.5 + 0.3 * 5**0.5])
+@pytest.mark.parametrize("breaks", [[0, 3], [-3, 0, 3], [0, 3, 6]])
+def test_pieces_that_are_worse_than_the_guess_at_one_place_alone_are_no_guess(breaks, center):
+    """A hump near the first or the last place at which a piece is judged; elsewhere and in the others all is flat."""
+    asked = []
+
+    def exact(places, side, guess):
+        x = 8 * (places - center)
+        value = np.exp(-(x**2))
+        asked.append(places.size)
+        if len(asked) > 2:  # behind the first round
+            assert np.abs(guess[:, 0] - value).max() <= 1e-2 * (1 + 1e-9)
+        return Known(np.stack([value, -16 * x * value, (256 * x**2 - 128) * value])[..., None])
+
+    def guess(places):
+        return np.exp(-((8 * (places - center)) ** 2))[:, None] + 1e-2
+
+    assert fit(exact, within(1e-3), np.array(breaks, dtype=float), guess).pieces > 8
+
+
 def test_a_function_that_no_quintics_follow_is_named_with_its_place():
     def root(t):
         x = np.abs(t - np.sqrt(2)) + 1e-300
@@ -197,6 +217,22 @@ def test_the_number_of_pieces_is_bounded():
     with pytest.raises(FitError):
         fit(known(waves), within(1e-9), ENDS, nothing, at_most=20)
     assert fit(known(waves), within(1e-9), ENDS, nothing, at_most=400).pieces <= 400
+
+
+def test_pieces_of_all_rounds_count():
+    """A narrow peak takes several rounds; those of the first ones lie beside it."""
+
+    def peak(t):
+        x = 50 * (t - 1.5)
+        return (np.exp(-(x**2)) * np.stack([1 + 0 * x, -100 * x, 1e4 * x**2 - 5e3]))[..., None]
+
+    def fitted(at_most):
+        return fit(known(peak), within(1e-3), ENDS, lambda t: np.zeros((t.size, 1)), at_most=at_most)
+
+    pieces = fitted(None).pieces
+    assert fitted(pieces).pieces == pieces
+    with pytest.raises(FitError):
+        fitted(pieces - 1)
 
 
 def test_a_long_way_with_many_breaks_may_have_more_pieces_than_a_short_one():

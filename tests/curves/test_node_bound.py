@@ -189,6 +189,24 @@ def test_a_slower_piece_that_is_less_well_known_counts_with_what_it_may_be():
         assert rest_of(both[order], np.array([1e-9, 0.5])[order]).upper_bound == pytest.approx(1.4, rel=1e-12)
 
 
+@pytest.mark.parametrize("order", [[0, 1, 2], [2, 1, 0], [1, 2, 0], [0, 2, 1]])
+def test_each_piece_that_is_not_divided_counts_with_what_it_may_be(order):
+    """Two even pieces, of which the one that is less well known may come after or before the other, and a hump."""
+    pieces = np.stack([0.9 + 0 * NODES, 0.9 + 0 * NODES, 1.0 - 9.0 * (NODES - 0.37) ** 2])
+    remainder = np.array([0.5, 0.0, 0.0])
+    found = rest_of(pieces[order][..., None], remainder[order], total)
+    assert found.upper_bound == pytest.approx(1.4, rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_peak_that_is_none_is_where_the_pieces_begin(order):
+    """Nothing moves, or nothing is known: the first moment stands for all of them."""
+    starts = [2.0, 4.0, 6.0][::order]
+    for remainder in (0.0, np.inf):
+        found = surveyed(np.zeros((3, 9, 2)), np.full(3, remainder), starts, [2.0] * 3)
+        assert found.largest(0, norm, lambda _: 1e-9, least=0.0).time == 2.0
+
+
 @pytest.mark.parametrize("piece", [0, 1, 2])
 @pytest.mark.parametrize("where", [0.0, 0.1, 0.37, 0.5, 0.81, 1.0])
 @pytest.mark.parametrize("sign", [1, -1])

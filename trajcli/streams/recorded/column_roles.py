@@ -144,7 +144,7 @@ class _Assignment:
         self._file, self._mapping = file, dict(mapping)
         self._joints = tuple(joints or ())
         self._names = [self._read(name) for name in file.names]
-        self._echo = any(name.startswith(_ECHO) for name in file.names)
+        self._echo = "t" not in file.names and any(name.startswith(_ECHO) for name in file.names)
         self._chosen: dict[str, ColumnGroup] = {}
 
     def _read(self, text: str) -> ColumnName:
