@@ -90,7 +90,7 @@ def test_a_step_in_acceleration_is_legal_where_no_jerk_limit_is() -> None:
     curve = with_jump("acceleration", 0.25)
     assert judge(curve, FREE) == []
     assert judge(curve, limits(velocity=100.0, acceleration=100.0)) == []
-    for one_sided in (LIMITED, limits(jerk=(-np.inf, 5e3))):
+    for one_sided in (LIMITED, limits(jerk=(-np.inf, 5e3)), limits(jerk=(-5e3, np.inf))):
         found = judge(curve, one_sided)
         assert [(f.kind, f.time, f.hint) for f in found] == [("acceleration_jump", 1.0, JERK_HINT)]
         assert found[0].value == pytest.approx(0.25)
@@ -407,6 +407,7 @@ def test_moves_are_named_by_their_index_and_not_by_their_place() -> None:
     assert [s.move for s in steps_of(whole)] == [4, 4]
 
 
+@pytest.mark.filterwarnings("ignore:invalid value encountered in maximum")
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("at_end", [True, False])
 def test_a_declared_state_that_is_no_number_is_not_met(value: float, at_end: bool) -> None:
@@ -414,3 +415,17 @@ def test_a_declared_state_that_is_no_number_is_not_met(value: float, at_end: boo
     name = "end" if at_end else "start"
     (found,) = check_continuity(replace(plain, **{name: state([value])}), [FREE])
     assert (found.kind, found.time) == ("position_jump", 2.0 if at_end else 0.0)
+
+
+def test_each_joint_of_each_move_has_its_own_jump_and_what_rounding_explains_of_it() -> None:
+    """Three moves of three joints that each begin 0.1 further on; the joints go 1, 10 and 100 far."""
+    ways = np.array([1.0, 10.0, 100.0])
+    moves = [between(list(0.1 + 1.1 * k * ways), list(0.1 + (1.1 * k + 1) * ways)) for k in range(3)]
+    whole = trajectory(*moves, start=state([0.0, 0.0, 0.0]))
+    found = check_continuity(whole, [limits(3)] * 3)
+    assert [(f.move, f.joint, f.time) for f in found] == [
+        (k, f"j{joint}", 2.0 * k) for k in range(3) for joint in (1, 2, 3)
+    ]
+    assert [f.value for f in found] == pytest.approx([0.1] * 3 + [*(0.1 * ways)] * 2)
+    furthest = 0.1 + 3.2 * ways
+    assert [f.limit for f in found] == pytest.approx([*(1e-9 * furthest)] * 3, rel=1e-2)

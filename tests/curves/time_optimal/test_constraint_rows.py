@@ -77,6 +77,18 @@ def test_rows_at_a_corner_are_those_of_its_side(side):
     assert rows.cap[0] ** 0.5 * abs(slope) == pytest.approx(2.0 if side == "left" else 0.5)
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_caps_of_approaches_at_a_corner_are_those_of_its_side(side):
+    """At 1 the joint is 0.5 below the end that it comes from, and 3 above the one to which it turns back."""
+    path = polyline([[0.0], [1.0], [-1.0]])
+    corner = path.breaks[1:2]
+    limits = ApproachLimits(np.array([[-2.0, 1.5]]), np.array([4.0]), np.array([0.0]))
+    rows = ApproachConstraint(path, limits).rows(corner, side)
+    slope = abs(path.evaluate(corner, 1, side=side)[0, 0])
+    wanted = (2 * 4.0 * (0.5 if side == "left" else 3.0)) ** 0.5
+    assert rows.cap[0] ** 0.5 * slope == pytest.approx(wanted, rel=1e-6)
+
+
 def test_wrong_bounds_are_refused():
     path, velocity, acceleration = joints(0)
     for wrong in (velocity[:2], velocity * [0, 1], velocity * [1, 0], -velocity):
@@ -236,6 +248,29 @@ def test_a_speed_between_its_ends_is_seen_whatever_another_joint_may_do(joint, s
     assert 1.2 - 1e-9 <= used[0] <= 1.6
     velocity[joint] = [-1.0, 9.0] if side > 0 else [-9.0, 1.0]
     assert JointConstraint(path, velocity, acceleration)._excess(coefficients, np.ones(1))[0][0] < 1.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("roomy", [1.0, 90.0])
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_speed_that_rises_slowly_and_falls_fast_is_seen(joint, backwards, roomy, side):
+    """0.9 + 0.18 (t - t^8) is 1.017 where t^7 is 1/8, more than half of its slope at the start would add.
+
+    The direction in which nothing moves may have far more room; the other joint rests.
+    """
+    rates = np.zeros(9)
+    rates[[0, 7, 8]] = -0.18, 0.18, 0.9
+    if backwards:
+        rates = np.array(np.poly1d(rates)(np.poly1d([-1.0, 1.0])).coeffs)
+    coefficients = np.zeros((10, 2, 1))
+    coefficients[:, joint, 0] = side * np.polyint(rates)
+    velocity = np.tile([-1.0, 1.0], (2, 1))
+    velocity[joint] = [-roomy, 1.0] if side > 0 else [-1.0, roomy]
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.zeros((1, 1, 2)))
+    constraint = JointConstraint(path, velocity, np.tile([-9.0, 9.0], (2, 1)))
+    largest = 0.9 + 0.18 * 7 / 8 * 8 ** (-1 / 7)
+    assert largest - 1e-12 <= constraint._excess(coefficients, np.ones(1))[0, 0] <= 1.1
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
