@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from through_jobs import curve_of, plan, timed
+from through_jobs import curve_of, job_text, plan, refusal, timed
 
-from trajcli.errors import MissingLimitError
+from trajcli.errors import MissingLimitError, PlanningError
+from trajcli.job.read import job_from_text
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.planners.waypoints import blends as module
 from trajcli.planners.waypoints.blends import blend_times
 from trajcli.planners.waypoints.through_points import PointTable
+from trajcli.trajectory import State
 
 POINTS = [[0.0, 0.0], [0.6, -0.2], [0.5, 0.4], [1.2, 0.1]]
 
@@ -116,3 +119,164 @@ def test_a_motion_through_its_ends_begins_and_ends_as_far_beside_them_as_it_goes
     np.testing.assert_allclose([curve.evaluate(0.0, 1), curve.evaluate(curve.end, 1)], v, atol=1e-12)
     np.testing.assert_allclose([planned.begins.position, planned.end.position], [first, last], atol=1e-12)
     np.testing.assert_allclose([planned.begins.velocity, planned.end.velocity], v)
+
+
+def planner_of(move: dict[str, object], joints: int = 2) -> object:
+    """Return the planner of a move from zero, as it is read."""
+    return job_from_text(job_text({"joints": [0.0] * joints}, move)).job.moves[0]
+
+
+def test_a_joint_that_goes_and_comes_back_moves() -> None:
+    limits = np.array([(-3.0, 3.0), (-np.inf, np.inf)])
+    with pytest.raises(MissingLimitError, match="j2"):
+        blend_times(
+            table([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]), None, robot(), limits, "inside", exactly=False
+        )
+
+
+@pytest.mark.parametrize("exactly", [False, True])
+@pytest.mark.parametrize(("sign", "speed"), [(1.0, 0.5), (-1.0, 0.25)])
+def test_a_way_takes_its_length_over_the_limit_of_its_direction_and_a_ramp(
+    sign: float, speed: float, exactly: bool
+) -> None:
+    """From rest to rest over D within v and a: D / v + v / a, by a trapezoid; the first joint rests."""
+    move = {"planner": "blends", "through": [{"joints": [0.0, sign * 2.0]}], "end_blends": "inside"}
+    limits = {"velocity": [[-1, 1], [-0.25, 0.5]], "acceleration": 2, "jerk": None}
+    made = plan({"joints": [0, 0]}, move | {"exactly": exactly}, limits=limits)
+    fastest = 2.0 / speed + speed / 2.0
+    assert made.trajectory.duration >= fastest * (1 - 1e-9)
+    if not exactly:  # that one takes the best of a few shares of the segment as the length of its ramps
+        assert made.trajectory.duration <= fastest * (1 + 1e-6)
+    rates = np.concatenate(curve_of(made).piece_ends(1))[:, 1]
+    assert np.abs(rates).max() <= speed * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("ends", ["centred", "inside"])
+def test_where_points_are_passed_exactly_some_limit_is_just_met(ends: str) -> None:
+    """The durations that are found go with the blends for which they were found."""
+    bounds = {"velocity": [[-0.6, 0.9], [-0.9, 0.6]], "acceleration": [[-3, 5], [-5, 3]]}
+    curve = curve_of(untimed(bounds, exactly=True, end_blends=ends))
+    used = []
+    for order, name in ((1, "velocity"), (2, "acceleration")):
+        values = np.concatenate(curve.piece_ends(order))
+        low, high = np.array(bounds[name], dtype=float).T
+        used.append(np.maximum(values / high, values / low).max())
+    assert max(used) == pytest.approx(1.0, rel=1e-3)
+    assert max(used) <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("exactly", [False, True])
+def test_blends_that_are_given_last_as_long_as_that_though_times_are_found(exactly: bool) -> None:
+    limits = {"velocity": 1, "acceleration": [9, 7]}
+    made = untimed(limits, blend_durations=[0.2, 0.3, 0.35, 0.25], exactly=exactly, end_blends="inside")
+    lasts = {0: 0.2, 1: 0.3, 2: 0.35, 3: 0.25}
+    blends = [phase for phase in made.moves[0].planned.phases if phase.name != "straight"]
+    assert {phase.point for phase in blends} == set(lasts)
+    for phase in blends:
+        assert phase.end - phase.start == pytest.approx(lasts[phase.point], rel=1e-9)
+    assert largest(made) <= 9 * (1 + 1e-9)
+
+
+def test_a_share_is_that_of_the_shorter_segment_beside_a_point() -> None:
+    family = module._Family(np.array(POINTS), None, 0.4, "inside", True)
+    np.testing.assert_allclose(family.blends(np.array([1.0, 3.0, 0.5])), [0.4, 0.4, 0.2, 0.2])
+
+
+def test_where_no_times_are_found_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "fastest_durations", lambda *_: None)
+    with pytest.raises(PlanningError, match="no times let the blends keep all limits"):
+        untimed({"velocity": 1, "acceleration": 3}, exactly=True)
+
+
+@pytest.mark.parametrize("default", [0.1, 0.4])
+def test_a_point_has_its_own_blend_and_others_the_common_one(default: float) -> None:
+    start, through = timed([0, 1, 2, 4], POINTS)
+    through[1]["blend"] = 0.25
+    made = plan(start, {"planner": "blends", "through": through, "blend_durations": default})
+    found = [p.end - p.start for p in made.moves[0].planned.phases if p.name != "straight"]
+    assert found == pytest.approx([default, default, 0.25, default])
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_of_recorded_points_there_must_be_as_many_as_blends(count: int) -> None:
+    """How many there are is known when the file is read, and not before."""
+    _, through = timed([0, 1, 2, 4], POINTS)
+    planner = planner_of({"planner": "blends", "through": through, "blend_durations": [0.1, 0.2, 0.3, 0.4]})
+    with pytest.raises(PlanningError, match=f"4 durations of blends for {count} points"):
+        planner._durations(table(np.zeros((count, 2))))
+
+
+def test_an_acceleration_that_is_given_with_times_is_used_as_it_is() -> None:
+    """More than the limit allows is over the limit, and no other motion is taken in its place."""
+    start, through = timed([0, 1, 2, 4], POINTS)
+    move = {"planner": "blends", "through": through, "acceleration": 8}
+    for limit, passes in ((9, True), (7, False)):
+        made = plan(start, move, passes=passes, limits={"acceleration": limit, "jerk": None})
+        assert largest(made) == pytest.approx(8, rel=1e-6)
+
+
+def test_phases_are_those_of_each_joint_where_its_acceleration_makes_its_blends() -> None:
+    """At point 1 both joints turn by 2 rad/s: with 4 and 8 rad/s^2 in 0.5 s and 0.25 s about it."""
+    start, through = timed([0, 2, 4], [[0.0, 0.0], [2.0, 2.0], [2.0, 2.0]])
+    through[1]["joints"] = [0.0, 0.0]
+    made = plan(start, {"planner": "blends", "through": through, "acceleration": [4, 8]})
+    planned = made.moves[0].planned
+    for joint, lasts in ((0, 0.5), (1, 0.25)):
+        (own,) = [p for p in planned.phases if p.joint == joint and p.point == 1]
+        assert own.start - planned.origin == pytest.approx(2.0 - lasts / 2)
+        assert own.end - planned.origin == pytest.approx(2.0 + lasts / 2)
+
+
+def test_the_joint_whose_blend_is_shortened_is_named() -> None:
+    """Both segments of 1 s have room for 1 s about the point between them; the second joint asks for 2 s."""
+    start, through = timed([0, 1, 2], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
+    made = plan(start, {"planner": "blends", "through": through, "acceleration": [20, 1]})
+    (event,) = [event for event in made.moves[0].planned.events if event.kind == "shrunk"]
+    assert event.amounts["joint"] == "j2"
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_least_acceleration_that_a_refusal_names_is_enough(backwards: bool) -> None:
+    """Of the first segment or of the last one, whichever is too short."""
+    times, q = ([0, 3, 4], [[0.0], [0.1], [0.9]]) if backwards else ([0, 1, 4], [[0.0], [0.8], [0.9]])
+    start, through = timed(times, q)
+    move = {"planner": "blends", "through": through, "end_blends": "inside"}
+    (problem,) = refusal(start, move | {"acceleration": 0.4}).problems
+    assert f"inside the {'last' if backwards else 'first'} segment" in problem.text()
+    least = float(re.search(r"it takes (\S+) rad/s\^2", problem.text()).group(1))
+    assert plan(start, move | {"acceleration": least}).verdict.passed
+    refusal(start, move | {"acceleration": least * (1 - 1e-4)})
+
+
+def test_accelerations_exclude_the_blend_of_a_single_point_too() -> None:
+    start, through = timed([0, 1, 2, 4], POINTS)
+    through[1]["blend"] = 0.25
+    move = {"planner": "blends", "through": through, "acceleration": 8}
+    assert "exclude each other" in str(refusal(start, move))
+
+
+def test_what_a_point_may_not_say_is_underlined_there_and_not_at_the_target() -> None:
+    start, through = timed([0, 1, 2], [[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]])
+    through[0]["velocity"] = [0.625, 0]
+    move = {"planner": "blends", "through": through[:1], "to": through[1], "blend_durations": 0.1}
+    (problem,) = refusal(start, move).problems
+    place = problem.place
+    assert place.source[place.column - 1 :].startswith(("[0.625", '"velocity"'))
+
+
+@pytest.mark.parametrize("rates", [((0.0, 0.0), (0.0, 0.5)), ((0.5, 0.0), (0.0, 0.5))])
+def test_a_start_that_accelerates_is_refused_with_times_too(rates: object) -> None:
+    _, through = timed([0, 1, 2, 4], POINTS)
+    planner = planner_of({"planner": "blends", "through": through, "blend_durations": 0.1})
+    start = State(np.zeros(2), *(np.array(values) for values in rates))
+    with pytest.raises(PlanningError, match="at its start"):
+        planner.plan(start, robot())
+
+
+def test_points_that_are_all_one_last_as_long_as_the_move_says() -> None:
+    points = [{"joints": [0.5, 0.5]}] * 2
+    limits = {"velocity": 1, "acceleration": 1}
+    made = plan(
+        {"joints": [0.5, 0.5]}, {"planner": "blends", "through": points, "duration": 1.75}, limits=limits
+    )
+    assert made.trajectory.duration == 1.75
