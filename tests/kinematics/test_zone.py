@@ -277,3 +277,48 @@ def test_a_motion_that_is_furthest_out_where_it_begins_or_ends_says_so(back):
     share, when = ZoneAround(arm(LEVER), np.zeros(1), Zone(orientation=0.5)).largest_share(curve)
     assert share == pytest.approx(1.2 / 0.5 if not back else 0.6 / 0.5, rel=1e-6)
     assert when == (1.0 if back else 0.0)
+
+
+def bump(sizes: list[float], pieces: int = 1) -> PiecewisePolynomial:
+    """Return the curve that goes from 0 to sizes and back, 4 u (1 - u), in each piece of 1 s."""
+    rows = np.array([-4.0, 4.0, 0.0])[:, None, None] * np.array(sizes)
+    return PiecewisePolynomial(np.arange(pieces + 1.0), np.tile(rows, (1, pieces, 1)))
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (-1, -1, -1), (1, 0, 1), (0, 1, 1), (1, 1, 0)])
+def test_what_all_joints_do_together_counts(signs):
+    """A stretched arm of three levers: to first order the tool goes 3, 2 and 1 times what its joints turn."""
+    size = 1e-4
+    curve = bump([size * sign for sign in signs])
+    away = size * abs(np.dot(signs, [3.0, 2.0, 1.0]))
+    for share in (1.1, 1.01, 0.99):
+        around = ZoneAround(arm(LEVER, LEVER, LEVER), np.zeros(3), Zone(position=away / share))
+        found, when = around.largest_share(curve)
+        assert found == pytest.approx(share, rel=1e-3) if share > 1 else found <= 1.0
+        assert share < 1 or when == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("tight", ["position", "orientation", "joints"])
+def test_a_measure_with_room_hides_none_that_has_not(tight):
+    """A bump of 0.1 rad of a lever of 1 m: 0.1 rad, and a chord of 2 sin 0.05."""
+    sizes = {"position": 2 * np.sin(0.05), "orientation": 0.1, "joints": 0.1}
+    for share in (1.2, 0.9):
+        zone = {name: size / (share if name == tight else 0.05) for name, size in sizes.items()}
+        around = ZoneAround(
+            arm(LEVER), np.zeros(1), Zone(zone["position"], zone["orientation"], (zone["joints"],))
+        )
+        found, _ = around.largest_share(bump([0.1]))
+        assert found == pytest.approx(share, rel=1e-4) if share > 1 else found <= 1.0
+
+
+@pytest.mark.parametrize("pieces", [1, 40])
+def test_many_pieces_that_come_near_the_border_are_all_proven_to_stay_within(pieces):
+    around = ZoneAround(arm(LEVER, LEVER), np.zeros(2), Zone(position=0.3001, joints=(0.1001, 0.1001)))
+    assert around.largest_share(bump([0.1, 0.1], pieces))[0] <= 1.0
+
+
+@pytest.mark.parametrize("enough", [0.2, 0.8])
+def test_what_is_more_than_enough_is_told_to_a_millionth(enough):
+    around = ZoneAround(arm(LEVER), np.zeros(1), Zone(joints=(0.2,)))
+    found, _ = around.largest_share(bump([0.1]), enough)
+    assert 0.5 * (1 - 1e-9) <= found <= max(0.5 * (1 + 2e-6), enough)

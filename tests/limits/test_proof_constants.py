@@ -103,6 +103,20 @@ def test_a_slow_tool_is_known_as_well(size):
     assert found.upper_bound <= found.value * (1 + 1e-6)
 
 
+def test_a_tool_that_turns_fast_is_not_known_worse_for_where_it_is():
+    """A slide in front of a wrist that turns at 1000 rad/s: of the speed as much is known as without it."""
+    shown, peak = hidden_peak()
+    joint = np.polyint(shown + 19 * (shown - np.eye(1, shown.size, shown.size - 1)[0]))
+    joints = Joint("slide", "prismatic"), Joint("turn")
+    robot = Robot("drill", joints, unlimited(2), "standard", np.eye(4), np.eye(4))
+    coefficients = np.zeros((joint.size, 1, 2))
+    coefficients[:, 0, 0], coefficients[-2, 0, 1] = joint, 1000.0
+    found = tool_bounds(robot, np.array([0.0, 1.0]), coefficients)
+    true = 1.0 + 20 * (peak - 1.0)
+    assert true * (1 - 1e-9) <= found[SPEED].upper_bound <= true * (1 + 5e-7)
+    assert found[ANGULAR_SPEED].upper_bound == pytest.approx(1000.0, rel=1e-6)
+
+
 def test_many_equal_peaks_are_all_known_well():
     """Eight thousand equal steps, each of which is fastest in its middle: 3 / 2 of its mean speed."""
     count, duration, step = 8000, 0.01, 0.002

@@ -164,3 +164,34 @@ def test_each_interval_of_a_path_has_its_own_speeds(begins: float, late: float) 
 
 def test_the_kinds_of_the_tool_are_those_that_this_file_knows() -> None:
     assert {kind.key for kind in TOOL_KINDS} == set(ToolLimits.__annotations__)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_motion_of_no_length_rests_where_it_is_in_all_orders(order: int) -> None:
+    found = tool_bounds(arm(), np.array([2.5, 2.5]), np.full((1, 1, 2), 0.3), order)
+    assert [(one.value, one.upper_bound, one.time) for one in found] == [(0.0, 0.0, 2.5)] * (2 * order)
+
+
+@pytest.mark.parametrize("law_start", [0.0, 2.0])
+@pytest.mark.parametrize("curve_start", [0.0, 5.0])
+def test_intervals_of_speed_have_the_times_of_the_joints_whenever_the_law_begins(
+    curve_start: float, law_start: float
+) -> None:
+    """A lever turns with 1 rad/s for 2 s, and with 3 rad/s for 1 s: with 0.5 m/s, and with 1.5 m/s."""
+    law = PiecewisePolynomial(
+        law_start + np.array([0.0, 2.0, 3.0]), np.array([[0.5, 1.5], [0.0, 1.0]])[:, :, None]
+    )
+    rows = np.zeros((2, 2, 2))
+    rows[:, :, 0] = [[1.0, 3.0], [0.0, 2.0]]
+    curve = PiecewisePolynomial(curve_start + np.array([0.0, 2.0, 3.0]), rows)
+    speeds = SpeedLimits(np.array([0.0, 1.0, 2.5]), (0, 2, 3), np.array([7.0, 8.0]), np.array([9.0, 6.0]))
+    first, second = speed_runs(arm(), speeds, law, curve)
+    assert (first.times, second.times) == (
+        (curve_start, curve_start + 2.0),
+        (curve_start + 2.0, curve_start + 3.0),
+    )
+    assert (first.segments, second.segments) == ((0, 1), (2, 2))
+    assert (first.s, second.s) == ((0.0, 1.0), (1.0, 2.5))
+    assert (first.limits, second.limits) == ((7.0, 9.0), (8.0, 6.0))
+    for run, rate in ((first, 1.0), (second, 3.0)):
+        assert [peak.upper_bound for peak in run.peaks] == pytest.approx([LEVER * rate, rate], rel=1e-6)

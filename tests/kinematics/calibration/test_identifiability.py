@@ -48,12 +48,45 @@ def difference_rank(robot, q, parameters, part):
     return rank
 
 
-@pytest.mark.parametrize("mixed", [np.eye(2), np.eye(2)[::-1], [[0.6, 0.8], [-0.8, 0.6]]])
+@pytest.mark.parametrize(
+    "mixed",
+    [
+        np.eye(2),
+        np.eye(2)[::-1],
+        [[0.6, 0.8], [-0.8, 0.6]],
+        -np.eye(2),
+        np.diag([1.0, -1.0]),
+        1e-9 * np.eye(2),
+    ],
+)
 def test_combinations_are_the_same_however_a_kernel_is_mixed(mixed) -> None:
     """Parameters 2 and 4 are each in one combination alone, the first and the third with either of them."""
     combinations = np.array([[0.75, 1.0, 0.0, 0.0], [-0.75, 0.0, 2.0, 1.0]])
     found = _reduced(np.asarray(mixed) @ combinations)
     np.testing.assert_allclose(found[np.argsort(found[:, 3])], combinations, atol=1e-12)
+
+
+@pytest.mark.parametrize("little", [1e-2, 1e-3, 1e-4])
+def test_a_parameter_with_a_little_weight_takes_part(little: float) -> None:
+    """Both others do with it what it does alike: eliminated from the right, it is in one combination alone."""
+    found = _reduced(np.array([[1.0, 0.0, little], [0.0, 1.0, little]]))
+    wanted = [[1 / little, 0.0, 1.0], [-1.0, 1.0, 0.0]]
+    np.testing.assert_allclose(found[np.argsort(-found[:, 2])], wanted, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e9])
+def test_the_weight_of_all_measurements_has_no_say_in_what_they_determine(size: float) -> None:
+    """Column 2 is the sum of the first two, and column 3 does nothing."""
+    parameters = parse_parameters(arm("ur", "standard"), "j1.theta,j2.theta,j3.theta,j4.theta")
+    columns = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 1.0, 0.0], [1.0, 2.0, 3.0, 0.0]])
+    found = identifiability(size * columns, parameters, 1.0)
+    assert found.rank == 2
+    weights = [{str(share.parameter): share.weight for share in shares} for shares in found.combinations]
+    root = 3**-0.5
+    assert weights == [
+        pytest.approx({"j1.theta": root, "j2.theta": root, "j3.theta": -root}),
+        {"j4.theta": 1.0},
+    ]
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
