@@ -144,24 +144,27 @@ def test_limits_are_those_of_the_call_whatever_numpy_prints_of_them(digits: int)
 
 
 @pytest.mark.parametrize("name", ["times", "q", "qd", "qdd"])
-@pytest.mark.parametrize("single", [True, False])
-def test_single_precision_explains_half_a_unit_of_its_last_place(name: str, *, single: bool) -> None:
-    """At 1 rad half a unit is 2^-24. Of times it explains none of the positions, and the other way round.
+@pytest.mark.parametrize(("kind", "rounding"), [("f2", 2.0**-11), ("f4", 2.0**-24), ("f8", 0.0), ("i4", 0.0)])
+def test_single_and_half_precision_explain_half_a_unit_of_their_last_place(
+    name: str, kind: str, rounding: float
+) -> None:
+    """At 1 rad half a unit is 2^-24, or 2^-11. Of times it explains none of the positions, and the other way round.
 
-    Of four arrays one is in single precision. A position is beyond its limit by half of that rounding, or by more.
+    Of four arrays one is of fewer bits; whole numbers are not rounded. A position is beyond its limit by half of that
+    rounding, or by more.
     """
-    at, rounding = 1.0, 2.0**-24
+    at = 1.0
     arrays = {
         "times": np.arange(5.0),
         "q": np.full((5, 1), at),
         "qd": np.zeros((5, 1)),
         "qdd": np.zeros((5, 1)),
     }
-    if single:
-        arrays[name] = arrays[name].astype(np.float32)
+    arrays[name] = arrays[name].astype(kind)
     for share in (0.5, 1.2, 3.0):
-        found = trajcli.check(**arrays, limits={"position": [[-9.0, at - share * rounding]]})
-        explained = single and name != "times" and share < 1
+        limit = at - share * (rounding or 2.0**-24)
+        found = trajcli.check(**arrays, limits={"position": [[-9.0, limit]]})
+        explained = rounding > 0 and name != "times" and share < 1
         assert found.verdict == ("within rounding" if explained else "exceeded"), share
 
 

@@ -33,6 +33,7 @@ def judged(
     values: np.ndarray,
     moves: np.ndarray,
     tolerance: Tolerance | None = None,
+    paths: dict[int, None] | None = None,
 ) -> list[Finding]:
     """Return what columns beside joints are found to be wrong, in blocks of a hundred rows."""
     nothing = np.zeros(q.shape[1])
@@ -52,7 +53,9 @@ def judged(
     columns = tuple(parse_column(name) for name in names.split())
     table = ToolTable(columns, np.zeros(len(columns)), lambda: blocks_of_size([values], SIZE))
     of_plan = plan().moves[0].planned.tool
-    paths = None if tolerance is None else dict.fromkeys(range(3), replace(of_plan, tolerance=tolerance))
+    if tolerance is not None:
+        driven_along = dict.fromkeys(range(3), replace(of_plan, tolerance=tolerance))
+        return judge_tool_columns(blocks, table, arms, driven_along, arms)
     return judge_tool_columns(blocks, table, arms, paths, arms)
 
 
@@ -104,6 +107,21 @@ def test_each_move_has_a_law_of_its_own(wrong: int | None) -> None:
     found = along(q, s, Tolerance())
     assert {(each.kind, each.move) for each in found} == (
         {("derivative", wrong)} if wrong is not None else set()
+    )
+
+
+@pytest.mark.parametrize("off", [0.0, 2e-9, -2e-9])
+@pytest.mark.parametrize("part", [0, 1])
+@pytest.mark.parametrize("moves", [[0, 1], [1, 0]])
+def test_a_move_without_a_path_has_no_distance_along_one(moves: list[int], part: int, off: float) -> None:
+    """Neither a distance forward nor one back; of whichever number the moves are."""
+    q, s = driven(2)
+    s[:] = 0.0
+    s[part * COUNT + 50, 0] = off
+    arms = ArmsOfMoves(plan().moves[0].robot, [])
+    found = judged(arms, q, "s sd sdd", s, np.repeat(moves, COUNT), paths={0: None, 1: None})
+    assert [(each.quantity, each.move, each.row) for each in found] == (
+        [("position", moves[part], part * COUNT + 51)] if off else []
     )
 
 

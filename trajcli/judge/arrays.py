@@ -15,9 +15,9 @@ from trajcli.errors import InputError
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Limits, Robot, unlimited
+from trajcli.streams.npy import share_of
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
-_SINGLE = 2.0**-24  # half a unit in the last place of single precision, relative
 _NAMES = ("times", "q", "qd", "qdd")
 
 
@@ -52,16 +52,9 @@ def judge_arrays(
     if t is None or positions is None:
         raise InputError("times and q are needed")
     _check_shapes(t, arrays, joints)
-    single = any(values is not None and values.dtype.itemsize < 8 for values in list(given.values())[1:])
+    shares = [0.0 if values is None else share_of(values.dtype) for values in given.values()]
     nothing = np.zeros(joints)
-    resolution = Resolution(
-        0.0,
-        nothing,
-        nothing,
-        nothing,
-        relative=_SINGLE if single else 0.0,
-        relative_time=_SINGLE if given["times"] is not None and given["times"].dtype.itemsize < 8 else 0.0,
-    )
+    resolution = Resolution(0.0, nothing, nothing, nothing, max(shares[1:]), shares[0])
     motion = RecordedMotion(
         t, positions, arrays["qd"], arrays["qdd"], None, None, None, None, resolution, "the motion"
     )

@@ -253,7 +253,7 @@ class _Judge:
                 continue
             if of_move is None or of_move.path is None or of_move.pure_rotation:
                 self._add_along_path(
-                    motion, np.abs(values[rows, 0]), self._table.half("path"), rows, "position"
+                    motion, np.abs(values[rows, 0]), self._table.half("path") + _EXACT, rows, "position"
                 )
                 continue
             rows = self._outside_zones(motion, values, rows, of_move)

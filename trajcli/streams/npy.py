@@ -57,7 +57,7 @@ class ArrayFile:
             raise InputError(f"{source.file}: the array is stored column by column", hint=hint)
         if self._plain:
             names, notes = plain_names(source.file, self._shape, joints, timed=timed)
-            self.relative = np.full(len(names), _share(self._dtype))
+            self.relative = np.full(len(names), share_of(self._dtype))
         else:
             names, self.relative, notes = self._field_names()
         self.notes: tuple[str, ...] = tuple(notes)
@@ -106,7 +106,7 @@ class ArrayFile:
         for field in self._dtype.names or ():
             of_field = self._dtype[field]
             names += _names_of(field, of_field.shape)
-            shares += [_share(of_field.base)] * (len(names) - len(shares))
+            shares += [share_of(of_field.base)] * (len(names) - len(shares))
         if not 1 <= len(self._shape) <= 2 or min(self._shape) < 1:
             raise InputError(f"{self._source.file}: a structured array of shape {self._shape}", hint=_LAYOUT)
         return names, np.array(shares), _note_on_chunks(self._shape)
@@ -172,7 +172,7 @@ def open_archive(source: ByteSource, joints: int | None = None, *, timed: bool =
         array = next(iter(arrays.values()))
         names, notes = plain_names(source.file, array.shape, joints, timed=timed)
         columns = array.reshape(-1, array.shape[-1])
-        return _rows_of(source.file, "npy", names, columns, [_share(array.dtype)] * len(names), notes)
+        return _rows_of(source.file, "npy", names, columns, [share_of(array.dtype)] * len(names), notes)
     tables = [array for array in arrays.values() if array.ndim > 1] or list(arrays.values())
     if not tables or not tables[0].size:
         raise InputError(f"{source.file} holds no rows", hint=_LAYOUT)
@@ -184,7 +184,7 @@ def open_archive(source: ByteSource, joints: int | None = None, *, timed: bool =
     names, shares, parts = list[str](), list[float](), list[Array]()
     for name, array in taken.items():
         found = _names_of(name, array.shape[len(rows) :])
-        names, shares = [*names, *found], [*shares, *[_share(array.dtype)] * len(found)]
+        names, shares = [*names, *found], [*shares, *[share_of(array.dtype)] * len(found)]
         parts.append(array.reshape(int(np.prod(rows)), -1).astype(np.float64))
     rest = [name for name in arrays if name not in taken]
     notes = [f"arrays that are not read: {', '.join(rest)}"] if rest else []
@@ -253,7 +253,7 @@ def _head(stream: Any, file: str) -> tuple[np.dtype[Any], tuple[int, ...], bool]
     return dtype, shape, fortran
 
 
-def _share(dtype: np.dtype[Any]) -> float:
+def share_of(dtype: np.dtype[Any]) -> float:
     """Return by which share of itself a number of a type may be rounded; 0 of float64 and whole numbers."""
     if dtype.kind != "f" or dtype.itemsize >= 8:
         return 0.0

@@ -228,7 +228,7 @@ def test_few_decimals_of_a_group_are_no_faults_and_hide_few(
     whole: tuple[Plan, list[str], Rows],
     tmp_path: Path,
 ) -> None:
-    """Three decimals explain what they make of all columns beside, and not three times as much."""
+    """Three decimals explain what they make of all columns beside, of the joints up to three times, and not more."""
     plan, names, rows = whole[0], whole[1], whole[2].copy()
     coarse = {k: 3 for k, name in enumerate(names) if group_of(parse_column(name)) == group}
     assert len(coarse) > 5
@@ -236,7 +236,7 @@ def test_few_decimals_of_a_group_are_no_faults_and_hide_few(
     rows[60, names.index(name)] += 30.0
     found = of_tool(judged(plan, names, rows, tmp_path / "rows.csv", coarse))
     assert set(found) == {quantity}
-    assert rounding / 2 < (found[quantity].limit or 0.0) < 3 * rounding
+    assert rounding / 2 < (found[quantity].limit or 0.0) < (3 if group.startswith("q") else 1.01) * rounding
 
 
 @pytest.mark.parametrize(("name", "columns"), [("sd_mm", EVERYTHING), ("vz_mm", "[t, q, twist]")])
