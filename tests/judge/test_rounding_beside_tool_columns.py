@@ -16,7 +16,9 @@ from trajcli.judge.tool_columns import ToolTable, judge_tool_columns
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
-POSE, TWIST, TWISTD = "x y z qw qx qy qz".split(), "vx vy vz wx wy wz".split(), "ax ay az ex ey ez".split()
+POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
+TWIST = ["vx", "vy", "vz", "wx", "wy", "wz"]
+TWISTD = ["ax", "ay", "az", "ex", "ey", "ez"]
 NAMES = [*POSE, *TWIST, *TWISTD]
 T = np.linspace(0.0, 2.0, 80)
 ROW = 60
