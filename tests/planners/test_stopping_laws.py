@@ -169,3 +169,25 @@ def test_no_law_along_a_path_is_taken_to_be_faster_than_its_bounds():
     start, end = np.zeros((1, 2)), np.array([[0.246, 4.0]])
     assert part.durations(start, end)[0, 0] > 0.3 / 0.25
     assert part.durations(end * [1, -1], start)[0, 0] > 0.3 / 0.25
+
+
+@pytest.mark.parametrize("moves", MOVES)
+def test_a_search_that_stops_at_rough_grids_goes_on_as_if_it_had_not(moves):
+    chain, _ = chain_with(moves)
+    row = row_of(chain, [1.0, 1.0], [0.95, 0.95], {})
+    begun = begin_search(row.nodes, row.parts, chain.ends)
+    rough, fine = begun.until(1e-3), begun.until()
+    assert rough.number < fine.number
+    assert rough.best.duration > fine.best.duration
+    assert np.array_equal(rough.until().best.states, fine.best.states)
+    assert rough.until().number == fine.number
+
+
+def test_typical_bounds_of_the_same_part_of_a_course_are_looked_for_once(monkeypatch):
+    course = chain_with("lines")[0].courses[0]
+    whole = course.typical_bounds(0.0, course.length)
+    half = course.typical_bounds(0.0, course.length / 2)
+    assert not np.array_equal(whole, half)
+    monkeypatch.setattr(type(course), "rates", None)
+    assert course.typical_bounds(0.0, course.length) is whole
+    assert course.typical_bounds(0.0, course.length / 2) is half

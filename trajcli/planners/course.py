@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -90,9 +91,14 @@ class Course(ABC):
         return self.curve.end
 
     @property
+    def straight(self) -> bool:
+        """Whether its joints go straight."""
+        return self.curve.degree == 1 and self.curve.pieces == 1
+
+    @property
     def uniform(self) -> bool:
         """Whether its bounds are the same everywhere."""
-        return self.curve.degree == 1 and self.curve.pieces == 1 and not self.limits_tool
+        return self.straight and not self.limits_tool
 
     @property
     def limits_along(self) -> tuple[float, float, float] | None:
@@ -130,12 +136,20 @@ class Course(ABC):
 
         They are the geometric means of those at some s, exact where they are the same everywhere.
         """
+        if (low, high) in self._typical_bounds:
+            return self._typical_bounds[low, high]
         some = np.linspace(low, high, 1 if self.uniform else _SAMPLES).tolist()
         rows = np.concatenate([self.bounds(self.rates(np.array([s])))(np.zeros((1, 2))) for s in some])
         sizes = np.abs(rows)
         with np.errstate(divide="ignore"):
             means = np.exp(np.log(sizes).mean(axis=0))
-        return np.asarray(means * [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0])
+        found = self._typical_bounds[low, high] = means * [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]
+        return found
+
+    @cached_property
+    def _typical_bounds(self) -> dict[tuple[float, float], Array]:
+        """What `typical_bounds` has returned: a chain is searched many times."""
+        return {}
 
     def constraints(self, path: PiecewisePolynomial) -> tuple[PathConstraint, ...]:
         """Return what limits laws along a part of its path besides the rates of joints."""

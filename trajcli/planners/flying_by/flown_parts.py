@@ -18,6 +18,7 @@ from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.robot import Robot
 from trajcli.limits.parts import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
@@ -30,6 +31,8 @@ _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by
 _HOPELESS = 1.3  # times a limit after the first steps of a law between states
 _LONGER = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
 _SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
+_SAMPLES = 9  # of a straight line, its ends included, at which bounds of its law are looked at
+_CLOSE = 5e-4  # relative: a duration above that within typical bounds at which a law is fast enough
 _BACKWARD = 1e-9  # of the length: a law that goes back by less stands still
 
 
@@ -93,19 +96,55 @@ class CourseLaws:
                 part = PathPart(slowed(course.typical_bounds(*stretch), tempo), stretch[1] - stretch[0])
             return _along_line(course, part, stretch, states, index)
         key = (id(course), index, stretch, states.tobytes(), tempo)
-        if key not in self._found:
-            found: FlownPart | NoLawError
-            try:
-                found = along_path(course, stretch, states, tempo)
-            except (UnreachableSpeedError, UnsettledSpeedError) as error:
-                found = NoLawError(str(error), {index: error.s})
-            except ReversingLawError as error:
-                found = NoLawError(str(error), {index: None})
-            self._found[key] = course, found  # a course that is kept shares its identity with no other
+        if key not in self._found:  # a course that is kept shares its identity with no other
+            self._found[key] = course, _law_between(course, index, stretch, states, tempo)
         found = self._found[key][1]
         if isinstance(found, NoLawError):
             raise NoLawError(found.reason, found.failing)
         return found
+
+
+def _law_between(
+    course: Course, index: int, stretch: tuple[float, float], states: Array, tempo: float
+) -> FlownPart | NoLawError:
+    """Return the fastest motion that is found between two states along a path, or why there is none.
+
+    Where the joints go straight, limits of the tool bound one variable, and often hardly change.
+    """
+    simple, close = _within_tightest(course, index, stretch, states, tempo)
+    if simple is not None and close:
+        return simple
+    try:
+        found = along_path(course, stretch, states, tempo)
+    except (UnreachableSpeedError, UnsettledSpeedError) as error:
+        return simple or NoLawError(str(error), {index: error.s})
+    except ReversingLawError as error:
+        return simple or NoLawError(str(error), {index: None})
+    return found if simple is None or found.curve.duration < simple.curve.duration else simple
+
+
+def _within_tightest(
+    course: Course, index: int, stretch: tuple[float, float], states: Array, tempo: float
+) -> tuple[FlownPart | None, bool]:
+    """Return the fastest motion along a straight line within the tightest bounds of its law.
+
+    Returns:
+        The motion, None where it does not keep all limits; whether looser bounds would gain next to nothing.
+    """
+    if not course.straight:
+        return None, False
+    rates = course.rates(np.linspace(*stretch, _SAMPLES))
+    rows = np.stack([course.bounds(rates)(np.zeros((1, 2)))[0], course.typical_bounds(*stretch)])
+    tight, typical = (PathPart(row, stretch[1] - stretch[0]) for row in slowed(rows, tempo))
+    try:
+        found = _along_line(course, tight, stretch, states, index)
+    except PlanningError:
+        return None, False
+    curve, robot = found.curve, course.robot
+    if _findings(curve, MoveInterval(0.0, curve.duration, robot, found.tool), robot, 0):
+        return None, False
+    enough = float(typical.durations(states[:1], states[1:])[0, 0])
+    return found, curve.duration <= enough * (1 + _CLOSE)
 
 
 def flown_parts(
@@ -296,11 +335,13 @@ def zone_motion(chain: FlyByChain, number: int, states: Array) -> FlownPart:
 
 def findings_of(chain: FlyByChain, number: int, part: FlownPart) -> list[Finding]:
     """Return what is wrong with a part: courses and zones are counted in turns."""
-    robot, curve = chain.courses[0].robot, part.curve
+    return _findings(part.curve, move_part(chain, number, part, 0.0), chain.courses[0].robot, number)
+
+
+def _findings(curve: PiecewisePolynomial, one: MoveInterval, robot: Robot, number: int) -> list[Finding]:
     span = Span(number, "zone" if number % 2 else "course", curve.start, curve.end, 2, robot.payload)
     ends = state_at(curve, curve.start), state_at(curve, curve.end)
     trajectory = Trajectory(curve, robot.joint_names, robot.joint_types, (span,), *ends)
-    one = move_part(chain, number, part, 0.0)
     return list(part_findings(limited_part(trajectory, span, one), one.around))
 
 

@@ -9,7 +9,7 @@ to what limits allow before any law is looked for.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +42,7 @@ _EASED = 0.985  # of the pace of a bent course: states on its limits leave a law
 _TRIES, _FASTER, _STEEPER = 6, 1.01, 1.06  # bolder states: times their speeds, times their accelerations
 _ENOUGH = 1e-4  # relative: a gain that is worth another law
 _CAREFUL = 0.97  # of the pace of a law from rest to rest: a state that is too fast costs a law in vain
+_ROUGH = 1e-3  # size of grids whose states show which zones are over a limit
 _BASIN = 0.02  # size of grids at which the better of two searches is known
 POWERS = np.arange(1, 4)  # of a pace, in velocities, accelerations and jerks
 _ORDERS = {kind.name: kind.order for kind in TOOL_KINDS}
@@ -197,14 +198,16 @@ class MotionSearch:
         before = math.inf
         for turn in range(_LOWERINGS):
             row = row_of(self.chain, paces.tolist(), eased.tolist(), self._stopping.states(self.chain))
-            found = _found(row, self.chain.ends, self._near, twice=self.exact)
-            if not math.isfinite(found.duration):
-                break
-            if self.exact:
-                self.model = min(self.model, found.duration)
-            self._lowering += max(found.duration - before, 0.0)
-            self._near, before = found.states, found.duration
-            if turn + 1 == _LOWERINGS or not self._lowered(found.states):
+            for found in _found(row, self.chain.ends, self._near, twice=self.exact):
+                if not math.isfinite(found.duration):
+                    return found, row
+                if self.exact:
+                    self.model = min(self.model, found.duration)
+                self._lowering += max(found.duration - before, 0.0)
+                self._near, before = found.states, found.duration
+                if turn + 1 < _LOWERINGS and self._lowered(found.states):
+                    break
+            else:
                 break
         return found, row
 
@@ -267,11 +270,19 @@ def duration_of(parts: Sequence[FlownPart]) -> float:
     return math.fsum(part.curve.duration for part in parts)
 
 
-def _found(row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twice: bool) -> FoundStates:
-    """Return the states that are found for a row of nodes and parts."""
+def _found(
+    row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twice: bool
+) -> Iterator[FoundStates]:
+    """Yield the states that are found for a row of nodes and parts, at last the fastest.
+
+    Those of rough grids come before where paths bend: they show which zones are to be slower.
+    """
     forward = begin_search(row.nodes, row.parts, ends, near)
     if not twice:
-        return forward.until().found()
+        forward = forward.until(_ROUGH)
+        yield forward.found()
+        yield forward.until().found()
+        return
     mirror = np.array([1.0, -1.0])
     back, back_near = backwards(row), None if near is None else near[::-1] * mirror
     other = begin_search(back.nodes, back.parts, (ends[1] * mirror, ends[0] * mirror), back_near).until(
@@ -279,9 +290,10 @@ def _found(row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twic
     )
     forward = forward.until(_BASIN)
     if forward.best.duration <= other.best.duration:
-        return forward.until().found()
+        yield forward.until().found()
+        return
     found = other.until().found()
-    return FoundStates(found.states[::-1] * mirror, found.durations[::-1])
+    yield FoundStates(found.states[::-1] * mirror, found.durations[::-1])
 
 
 def _changes(chain: FlyByChain, row: ChainRow, found: FoundStates, parts: Sequence[FlownPart]) -> Array:

@@ -80,6 +80,7 @@ class ChainSearch:
         parts: What lies between, before and behind them, k + 1.
         best: What is found so far.
         sizes: Of the next grids around it, of the bounds of the speed, for each window.
+        steps: What the last round of each window has changed; None where it gained nothing.
         number: Of the next round.
     """
 
@@ -87,15 +88,15 @@ class ChainSearch:
     parts: tuple[ChainPart, ...]
     best: FoundStates
     sizes: tuple[float, ...]
+    steps: tuple[Array | None, ...]
     number: int = 0
 
     def until(self, size: float = _FINEST) -> ChainSearch:
         """Return the search after as many rounds as make grids smaller than a size."""
-        best, sizes, number = self.best, list(self.sizes), self.number
+        best, sizes, steps, number = self.best, list(self.sizes), list(self.steps), self.number
         if not self.nodes or not math.isfinite(best.duration):
             return self
         windows = _windows(len(self.parts), _AT_ONCE)
-        steps: list[Array | None] = [None] * len(windows)
         while max(sizes) >= size and number < _ROUNDS:
             for k, (low, high) in enumerate(windows):
                 if sizes[k] < size:
@@ -109,7 +110,7 @@ class ChainSearch:
                 if gain > 0:
                     best = best.with_part(low, other)
             number += 1
-        return ChainSearch(self.nodes, self.parts, best, tuple(sizes), number)
+        return ChainSearch(self.nodes, self.parts, best, tuple(sizes), tuple(steps), number)
 
     def _round(
         self, before: FoundStates, low: int, size: float, number: int, step: Array | None
@@ -169,16 +170,17 @@ def begin_search(
     """
     first, last = ends[0][None], ends[1][None]
     windows = len(_windows(len(parts), _AT_ONCE))
+    steps = (None,) * windows
     if near is not None:
         inner = [node.inside(state[None]) for node, state in zip(nodes, near[1:-1], strict=True)]
         found = _fastest([first, *inner, last], parts)
         if math.isfinite(found.duration):
-            return ChainSearch(tuple(nodes), tuple(parts), found, (_NEARBY,) * windows)
+            return ChainSearch(tuple(nodes), tuple(parts), found, (_NEARBY,) * windows, steps)
     grids = [first, *(node.grid() for node in nodes), last]
     found = _by_windows(grids, nodes, parts)
     if not math.isfinite(found.duration):
         found = _fastest(_completed(grids, nodes, parts), parts)
-    return ChainSearch(tuple(nodes), tuple(parts), found, (_FIRST,) * windows)
+    return ChainSearch(tuple(nodes), tuple(parts), found, (_FIRST,) * windows, steps)
 
 
 def _by_windows(grids: list[Array], nodes: Sequence[BorderNode], parts: Sequence[ChainPart]) -> FoundStates:
