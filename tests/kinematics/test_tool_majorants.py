@@ -13,7 +13,7 @@ from trajcli.geometry.power_series import growth, series_exponential, series_pro
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.kinematics.tool_majorants import majorants
+from trajcli.kinematics.tool_derivatives import majorants
 
 ORDER, LENGTH = 11, 0.3
 RNG = np.random.default_rng(11)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
@@ -27,6 +27,8 @@ from trajcli.suggest import did_you_mean
 from trajcli.units import Quantity, Units
 
 M = TypeVar("M", bound=BaseModel)
+V = TypeVar("V")
+_Deviation = tuple[float | None, float | None] | None
 _AXES, _QUATERNION, _DEVIATIONS = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("position", "angle")
 _OWN = tuple(f"sigma_{name}" for name in _DEVIATIONS)
 _YAML = (".yaml", ".yml", ".json")
@@ -78,23 +80,13 @@ def read_measurements(path: str, robot: Robot, units: Units) -> Measurements:
     """
     if not path.lower().endswith(_YAML):
         return _from_table(read_csv(path), robot)
-    document, context = _open_list(path, robot, units)
-    joints, targets, deviations, problems = [], [], [], list[Problem]()
-    for index, item in enumerate(document.plain()):
-        try:
-            spec, fixed = _measurement(item, document, index, context)
-            targets.append(_target(spec, fixed, document, index))
-            joints.append(spec.joints)
-            deviations.append(None if spec.sigma is None else (spec.sigma.position, spec.sigma.angle))
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(*_first_of_each(problems))
+    document, entries = _entries(path, robot, units, _measured)
+    joints, targets, deviations = zip(*entries, strict=True)
     places = [document.place((index,)) for index in range(len(targets))]
     flaw = next(_flaws_of_deviations(deviations, targets), None)
     if flaw is not None:
         raise InputError(Problem(flaw[1], flaw[2], places[flaw[0]]))
-    known = None if deviations[0] is None else np.array([[a or 1.0, b or 1.0] for a, b in deviations])  # type: ignore[misc]
+    known = None if deviations[0] is None else np.array([[a or 1.0, b or 1.0] for a, b in deviations])
     return Measurements(np.array(joints), tuple(_kinds(targets)), known)
 
 
@@ -107,16 +99,11 @@ def read_configurations(path: str, robot: Robot, units: Units) -> Array:
     """
     if not path.lower().endswith(_YAML):
         return joint_columns(read_csv(path), robot)
-    document, context = _open_list(path, robot, units)
-    rows, problems = [], list[Problem]()
-    for index, item in enumerate(document.plain()):
-        try:
-            rows.append(_validated(ConfigurationSpec, item, document, index, context).joints)
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(*_first_of_each(problems))
-    return np.array(rows)
+
+    def joints(item: Any, document: Document, index: int, context: ReadingContext) -> Any:  # noqa: ANN401
+        return _validated(ConfigurationSpec, item, document, index, context).joints
+
+    return np.array(_entries(path, robot, units, joints)[1])
 
 
 def _first_of_each(problems: Sequence[Problem]) -> list[Problem]:
@@ -133,14 +120,31 @@ def _first_of_each(problems: Sequence[Problem]) -> list[Problem]:
     return found
 
 
-def _open_list(path: str, robot: Robot, units: Units) -> tuple[Document, ReadingContext]:
+def _entries(
+    path: str, robot: Robot, units: Units, read: Callable[[Any, Document, int, ReadingContext], V]
+) -> tuple[Document, list[V]]:
+    """Return what each entry of a list is read as.
+
+    Raises:
+        InputError: With the flaws of all.
+        FileError: When the file cannot be read.
+    """
     document = read_document(path, any_root=True)
     content = document.root.value
     if not isinstance(content, list) or not content:
         got = "an empty list" if isinstance(content, list) else shown(document.plain())
         hint = "such as `- {joints: [0, 0.5], pose: {xyz: [0.4, 0.1, 0.3]}}`"
         raise InputError(Problem(f"expected a list of measurements, got {got}", hint, document.place(())))
-    return document, ReadingContext(units, robot.joint_names, robot.joint_types)
+    context = ReadingContext(units, robot.joint_names, robot.joint_types)
+    entries, problems = list[V](), list[Problem]()
+    for index, item in enumerate(document.plain()):
+        try:
+            entries.append(read(item, document, index, context))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(*_first_of_each(problems))
+    return document, entries
 
 
 def _validated(
@@ -175,6 +179,17 @@ def _measurement(
     return _validated(MeasurementSpec, filled, document, index, context), (x, y, z)
 
 
+def _measured(
+    item: Any,  # noqa: ANN401
+    document: Document,
+    index: int,
+    context: ReadingContext,
+) -> tuple[Any, IkTarget, _Deviation]:
+    spec, fixed = _measurement(item, document, index, context)
+    target = _target(spec, fixed, document, index)
+    return spec.joints, target, None if spec.sigma is None else (spec.sigma.position, spec.sigma.angle)
+
+
 def _target(
     spec: MeasurementSpec, fixed: tuple[bool, bool, bool] | None, document: Document, index: int
 ) -> IkTarget:
@@ -203,7 +218,7 @@ def _kinds(targets: Sequence[IkTarget]) -> Iterator[MeasuredKind]:
 
 
 def _flaws_of_deviations(
-    deviations: Sequence[tuple[float | None, float | None] | None], targets: Sequence[IkTarget]
+    deviations: Sequence[_Deviation], targets: Sequence[IkTarget]
 ) -> Iterator[tuple[int, str, str]]:
     """Yield the measurements that lack a deviation which others have, or their own part needs."""
     if not any(deviations):

@@ -24,7 +24,7 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import revolute
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.tool_majorants import majorants
+from trajcli.kinematics.tool_derivatives import majorants
 from trajcli.limits.kinds import LimitedMove
 
 _CLOSE = 1e-3  # of the tolerance: of the remainder, and of the hull

@@ -17,8 +17,7 @@ from trajcli.frozen import frozen
 from trajcli.geometry.power_series import growth
 from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.tool_derivatives import tool_derivatives
-from trajcli.kinematics.tool_majorants import majorants
+from trajcli.kinematics.tool_derivatives import majorants, tool_derivatives
 
 ToolPeak = BoundedPeak
 """The largest magnitude of a vector over time."""

@@ -136,15 +136,16 @@ class Course(ABC):
 
         They are the geometric means of those at some s, exact where they are the same everywhere.
         """
-        if (low, high) in self._typical_bounds:
-            return self._typical_bounds[low, high]
+        known = self._typical_bounds.get((low, high))
+        if known is not None:
+            return known
         some = np.linspace(low, high, 1 if self.uniform else _SAMPLES).tolist()
         rows = np.concatenate([self.bounds(self.rates(np.array([s])))(np.zeros((1, 2))) for s in some])
         sizes = np.abs(rows)
         with np.errstate(divide="ignore"):
             means = np.exp(np.log(sizes).mean(axis=0))
-        found = self._typical_bounds[low, high] = means * [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]
-        return found
+        self._typical_bounds[low, high] = means * [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]
+        return self._typical_bounds[low, high]
 
     @cached_property
     def _typical_bounds(self) -> dict[tuple[float, float], Array]:

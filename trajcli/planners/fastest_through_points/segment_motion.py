@@ -1,13 +1,15 @@
-"""Exact motions between given states at points, segment by segment."""
+"""Exact motions between given states at points, segment by segment, and how far they leave chords."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
@@ -108,3 +110,32 @@ def _segment(profiles: Sequence[PhaseProfile]) -> PointMotion:
     phases = [phase for joint, profile in enumerate(profiles) for phase in profile.phases(joint)]
     phases.sort(key=lambda phase: (phase.start, phase.joint or 0))
     return PointMotion(curve, np.array([0.0, curve.duration]), tuple(phases))
+
+
+def off_chords(motion: PointMotion, points: Array, velocity: Array) -> tuple[Array, Array]:
+    """Return by how much each joint leaves the lines through neighbouring points, and when, each (n,).
+
+    A position is compared with the point of the line that is nearest when each joint is measured by the time
+    that it needs at its velocity limit.
+
+    Args:
+        motion: Of all joints.
+        points: Shape (m, n).
+        velocity: Bounds, shape (n, 2), perhaps infinite.
+    """
+    curve = motion.curve
+    weight = 1 / np.abs(velocity).max(axis=1) ** 2
+    middle = 0.5 * (curve.breaks[1:] + curve.breaks[:-1])
+    segment = np.clip(np.searchsorted(motion.times, middle) - 1, 0, len(points) - 2)
+    lines = np.array([after - before for before, after in pairwise(points)])
+    squares = (lines * lines * weight).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        across = np.where(squares[:, None] > 0, lines * weight / squares[:, None], 0.0)
+    coefficients = curve.coefficients.copy()
+    coefficients[-1] -= points[segment]
+    along = (coefficients * across[segment]).sum(axis=2)
+    coefficients -= along[..., None] * lines[segment]
+    (extremes,) = peaks(PiecewisePolynomial(curve.breaks, coefficients), (0,))
+    high = extremes.high >= -extremes.low
+    times = np.where(high, extremes.high_time, extremes.low_time)
+    return extremes.magnitude, times - curve.start

@@ -183,7 +183,7 @@ class FastestThroughPoints(PointSequence):
     def _through(self, points: GivenPoints, robot: Robot) -> Planned:
         """Return the motion of the joints that move; the others stand still."""
         from trajcli.planners.fastest_through_points.assembly import fastest_motion, straight_only
-        from trajcli.planners.fastest_through_points.deviation import off_chords
+        from trajcli.planners.fastest_through_points.segment_motion import off_chords
 
         joints = np.flatnonzero(points.moving)
         problem = _problem(points, robot, joints)
