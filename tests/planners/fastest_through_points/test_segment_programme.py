@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from trajcli.planners.fastest_through_points import linear_programme
 from trajcli.planners.fastest_through_points.linear_programme import SegmentProgramme, solved
 
 
@@ -60,6 +61,58 @@ def test_optimum_is_that_of_a_general_solver(seed, segments, joints, rows, share
     assert cost @ y == pytest.approx(known.fun, rel=1e-6, abs=1e-6)
     assert (matrix @ y <= high + 1e-8).all()
     assert (matrix @ y >= low - 1e-8).all()
+
+
+@pytest.mark.parametrize("segments", [4, 30])
+def test_what_is_mirrored_has_the_mirrored_optimum(segments):
+    """With -y for y upper bounds of s bind that were lower ones."""
+    programme = random_programme(5, segments, 2, 8, 2, weight=1e-6)
+    programme = replace(programme, least=0.1 * programme.least)
+    mirrored = SegmentProgramme(
+        programme.rows,
+        -programme.high,
+        -programme.low,
+        -programme.cost,
+        -programme.upper_bound,
+        -programme.least,
+        programme.weight,
+    )
+    y = solved(programme, 0.3)
+    np.testing.assert_allclose(solved(mirrored, 0.3), -y, rtol=1e-4, atol=1e-4)
+    assert (np.abs(programme.split(y)[1] - programme.least) < 1e-4).any()
+
+
+@pytest.mark.parametrize("segments", [4, 30])
+@pytest.mark.parametrize("size", [1e-4, 1e-2, 100.0])
+def test_small_programmes_are_solved_as_exactly_as_large_ones(segments, size):
+    """Bounds of another size, and the square weighted by its inverse: the optimum is as much larger."""
+    programme = random_programme(2, segments, 2, 8, 2, weight=1e-6)
+    scaled = replace(
+        programme,
+        **{name: size * getattr(programme, name) for name in ("low", "high", "least", "upper_bound")},
+        weight=1e-6 / size,
+    )
+    cost = programme.cost.ravel()
+    wanted, found = (
+        each[-cost.size :] @ cost for each in (solved(programme, 0.3), solved(scaled, 0.3 * size))
+    )
+    assert found / size == pytest.approx(wanted, rel=1e-6)
+
+
+def test_what_was_reached_is_returned_where_no_further_step_can_be_computed(monkeypatch):
+    programme = random_programme(0, 4, 3, 14, 3)
+    steps = [solved(programme, 0.3, rounds=count) for count in (0, 2)]
+
+    def failing(*given):
+        calls.append(given)
+        if len(calls) > 2:
+            raise np.linalg.LinAlgError
+        return newton(*given)
+
+    calls, newton = [], linear_programme._newton
+    monkeypatch.setattr(linear_programme, "_newton", failing)
+    np.testing.assert_array_equal(solved(programme, 0.3), steps[1])
+    np.testing.assert_array_equal(solved(programme, 0.3), steps[0])
 
 
 @pytest.mark.parametrize("segments", [5, 30])
