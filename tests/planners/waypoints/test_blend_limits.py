@@ -236,9 +236,11 @@ def test_the_joint_whose_blend_is_shortened_is_named() -> None:
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_the_least_acceleration_that_a_refusal_names_is_enough(backwards: bool) -> None:
-    """Of the first segment or of the last one, whichever is too short."""
-    times, q = ([0, 3, 4], [[0.0], [0.1], [0.9]]) if backwards else ([0, 1, 4], [[0.0], [0.8], [0.9]])
+@pytest.mark.parametrize("way", [0.8, 0.77, 0.71, 0.67, 0.61])
+def test_the_least_acceleration_that_a_refusal_names_is_enough(backwards: bool, way: float) -> None:
+    """Of the first segment or of the last one, whichever is too short; what is printed is rounded up."""
+    q = [[0.0], [0.1], [0.1 + way]] if backwards else [[0.0], [way], [way + 0.1]]
+    times = [0, 3, 3.9] if backwards else [0, 0.9, 4]
     start, through = timed(times, q)
     move = {"planner": "blends", "through": through, "end_blends": "inside"}
     (problem,) = refusal(start, move | {"acceleration": 0.4}).problems

@@ -134,10 +134,15 @@ def test_there_is_a_minimum_duration_for_each_segment(count: int, tmp_path: obje
         trajcli.plan(tmp_path / "job.json")
 
 
-def test_a_recorded_point_next_to_the_target_is_left_out(tmp_path: object) -> None:
-    """One that is where the move ends, as its file had it."""
-    (tmp_path / "points.csv").write_text("q1,q2,q3\n0.5,0.2,0.4\n0.5,0.3,0.7\n")
-    (tmp_path / "job.json").write_text(json.dumps(job({"csv": "points.csv"}, to=POINTS[2])))
+@pytest.mark.parametrize("at_target", [False, True])
+def test_the_last_recorded_point_is_not_the_end_where_a_target_follows(
+    at_target: bool, tmp_path: object
+) -> None:
+    """It is left out where it is next to the one before, or the target next to it."""
+    last = "0.5,0.3,0.7" if at_target else "0.5,0.21,0.4"
+    (tmp_path / "points.csv").write_text(f"q1,q2,q3\n0.5,0.2,0.4\n{last}\n")
+    said = job({"csv": "points.csv", "merge": 0.05}, to=POINTS[2])
+    (tmp_path / "job.json").write_text(json.dumps(said))
     planned = trajcli.plan(tmp_path / "job.json").moves[0].planned
     np.testing.assert_array_equal(planned.via_points.points[:, 1], [0, 0.2, 0.3])
 
