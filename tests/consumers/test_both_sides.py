@@ -75,7 +75,9 @@ def test_torques_and_their_rates_in_either_direction(side: float, rule: str) -> 
     tau[:, 4] = side * 12.1
     if rule == "fr3-torque-rate":
         tau[:9, 4], tau[9:, 4] = side * 10.0, side * 11.1
-    assert rules(replace(FRANKA, tau=tau), "franka-fr3") == {rule}
+    (told,) = judged(replace(FRANKA, tau=tau), "franka-fr3", Surroundings(FRANKA.joints, STILL[0])).findings
+    value, limit = (1100.0, 1000.0) if rule == "fr3-torque-rate" else (12.1, 12.0)
+    assert (told.rule, told.value, told.limit) == (rule, pytest.approx(side * value), side * limit)
 
 
 @SIDES
@@ -134,6 +136,68 @@ def test_velocity_towards_either_end(side: float) -> None:
         q[10:, 0] += side * share * allowed * 1e-3  # one step, from where 0.1 rad are left
         found = rules(replace(FRANKA, q=q), "franka-fr3")
         assert ("fr3-velocity-by-position" in found) == broken
+
+
+@SIDES
+@pytest.mark.parametrize("joint", range(7))
+@pytest.mark.parametrize(("share", "broken"), [(1.001, True), (0.999, False)])
+def test_each_joint_brakes_before_its_own_ends_as_it_can(
+    share: float, joint: int, side: float, *, broken: bool
+) -> None:
+    """Of a consumer whose joints differ in their ranges, decelerations and offsets, sqrt(2 d x) - o - margin is kept."""
+    fr3 = load_profile("franka-fr3")
+    (rule,) = (each for each in fr3.rules if each.id == "fr3-velocity-by-position")
+    index, margin, left = np.arange(7), 2e-3, 0.2
+    own = {"lower": -3.0 - 0.1 * index, "upper": 2.5 + 0.1 * index, "offset": 0.1 + 0.05 * index}
+    own |= {"deceleration": 4.0 + 0.7 * (index % 4)}
+    given = {name: values.tolist() for name, values in own.items()}
+    alone = replace(fr3, rules=(replace(rule, parameters={**rule.parameters, **given, "margin": margin}),))
+    allowed = np.sqrt(2 * own["deceleration"][joint] * left) - own["offset"][joint] - margin
+    q = np.zeros((21, 7))
+    q[:, joint] = own["upper"][joint] - left if side > 0 else own["lower"][joint] + left
+    q[10:, joint] += side * share * allowed * 1e-3
+    found = judge_by_profile([replace(FRANKA, q=q)], alone, Surroundings(FRANKA.joints, q[0])).findings
+    assert [(each.joint, each.row) for each in found] == [(f"joint_{joint + 1}", 11)] * broken
+
+
+@SIDES
+@pytest.mark.parametrize("name", ["velocity", "acceleration"])
+def test_what_counts_as_rest_may_be_nothing_at_all(name: str, side: float) -> None:
+    """A number that a consumer sets to zero is zero, and not what counts where it says none."""
+    fr3 = load_profile("franka-fr3")
+    (rule,) = (each for each in fr3.rules if each.id == "fr3-rest-end")
+    exact = replace(FRANKA, resolution=replace(FRANKA.resolution, qd=np.zeros(7), qdd=np.zeros(7)))
+    moving = with_value(exact, {"velocity": "qd", "acceleration": "qdd"}[name], -1, 2, side * 1e-7)
+    for given, broken in ({}, False), ({name: 0.0}, True):
+        parameters = {key: value for key, value in rule.parameters.items() if key != name} | given
+        alone = replace(fr3, rules=(replace(rule, parameters=parameters),))
+        found = judge_by_profile([moving], alone, Surroundings(FRANKA.joints, STILL[0])).findings
+        assert [each.joint for each in found] == ["joint_3"] * broken
+
+
+@SIDES
+@pytest.mark.parametrize(("faster", "kind"), [(20.0, "velocity"), (2.0, "acceleration")])
+def test_of_what_is_no_rest_the_worse_is_told(faster: float, kind: str, side: float) -> None:
+    """A velocity of so many times what counts as rest, and an acceleration of ten times that against it."""
+    within = FRANKA.resolution.qd[0]
+    rows = with_value(FRANKA, "qd", -1, 3, side * faster * (1e-6 + within))
+    rows = with_value(rows, "qdd", -1, 3, -side * 10.0 * (1e-3 + within))
+    found = judged(rows, "franka-fr3", Surroundings(rows.joints, STILL[0])).findings
+    (told,) = [each for each in found if each.rule == "fr3-rest-end"]
+    assert told.count == 2
+    assert f" the {kind} " in told.message
+
+
+@SIDES
+@pytest.mark.parametrize("coarse", [3, 5])
+def test_decimals_of_a_joint_say_nothing_of_another_that_is_too_fast(coarse: int, side: float) -> None:
+    """Joint 4 is too fast by a hundredth; half a unit of 3e-5 makes 0.06 rad/s of a difference, in its own joint alone."""
+    half = np.where(np.arange(7) == coarse, 3e-5, 0.0)
+    rows = replace(pushed(1.01, side, np.ones(20)), resolution=replace(FRANKA.resolution, q=half))
+    found = judged(rows, "franka-fr3", Surroundings(rows.joints, rows.q[0])).findings
+    (one,) = [each for each in found if each.rule == "fr3-velocity"]
+    assert one.factor == (None if coarse == 3 else pytest.approx(1.01, rel=1e-6))
+    assert ("decimals" in (one.hint or "")) == (coarse == 3)
 
 
 def pushed(share: float, side: float, periods: np.ndarray) -> RecordedMotion:

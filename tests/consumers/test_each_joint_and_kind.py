@@ -301,3 +301,34 @@ def test_decimals_that_make_more_jerk_than_a_share_of_its_limit_are_too_few(
     half[joint] = share * 25.0 * 1e-9 / 8.0
     rough = replace(FRANKA.resolution, q=half)
     assert bool(found(replace(FRANKA, resolution=rough), "franka-fr3", "fr3-decimals")) == broken
+
+
+@pytest.mark.parametrize("joint", [0, 4, 6])
+def test_joints_have_the_names_of_the_file_and_not_those_of_the_robot_in_its_order(joint: int) -> None:
+    names = tuple(f"joint_{k}" for k in (3, 1, 7, 2, 5, 4, 6))
+    rows = replace(with_value(FRANKA, "qd", -1, joint, 0.02), joints=names)
+    around = Surroundings(FRANKA.joints, STILL[0])
+    every = judge_by_profile([rows], load_profile("franka-fr3"), around).findings
+    assert {each.joint for each in every if each.rule == "fr3-rest-end"} == {names[joint]}
+
+
+@SIDES
+@pytest.mark.parametrize(("share", "broken"), [(0.99, False), (1.01, True)])
+@pytest.mark.parametrize("row", [0, 10, -1])
+def test_numbers_of_few_bits_are_as_rough_as_the_largest_of_a_joint(
+    row: int, share: float, side: float, *, broken: bool
+) -> None:
+    """Of single precision and less a share of each position is lost; 25 rad/s^3 are 8 of them over 1e-9 s^3."""
+    q = np.zeros((21, 7))
+    q[row, 4] = side * 2.0
+    rough = replace(FRANKA.resolution, q=np.zeros(7), relative=share * 25.0 * 1e-9 / 8.0 / 2.0)
+    told = found(replace(FRANKA, q=q, resolution=rough), "franka-fr3", "fr3-decimals")
+    assert [each.joint for each in told] == ["joint_5"] * broken
+    assert [each.limit for each in told] == [pytest.approx(25.0)] * broken
+
+
+def test_of_joints_that_are_rounded_alike_the_one_with_the_least_jerk_is_named() -> None:
+    """The second joint of this arm may have 3750 rad/s^3, the others more."""
+    rough = replace(FRANKA.resolution, q=np.full(7, 3e-9))
+    (told,) = found(replace(FRANKA, resolution=rough), "franka-fer", "fer-decimals")
+    assert (told.joint, told.value) == ("joint_2", pytest.approx(24.0))

@@ -192,21 +192,22 @@ def test_names_of_joints() -> None:
     ]
 
 
-def test_a_partial_goal_misses_a_joint() -> None:
-    rows = CLEAN["ros-jtc"]
+@pytest.mark.parametrize("missing", [0, 3, 6])
+def test_a_partial_goal_misses_a_joint(missing: int) -> None:
+    rows, others = CLEAN["ros-jtc"], np.delete(np.arange(7), missing)
     part = replace(
         rows,
-        q=rows.q[:, :6],
-        qd=rows.qd[:, :6],
-        qdd=rows.qdd[:, :6],
-        joints=rows.joints[:6],
+        q=rows.q[:, others],
+        qd=rows.qd[:, others],
+        qdd=rows.qdd[:, others],
+        joints=tuple(f"joint_{joint + 1}" for joint in others),
         resolution=replace(
-            rows.resolution, q=rows.resolution.q[:6], qd=rows.resolution.qd[:6], qdd=rows.resolution.qdd[:6]
+            rows.resolution, **{name: getattr(rows.resolution, name)[others] for name in ("q", "qd", "qdd")}
         ),
     )
-    found = judged(part, "ros-jtc", surroundings(7))
-    missing = [(each.kind, each.message) for each in found.findings]
-    assert missing == [("position", "the joint 'joint_7' is missing")]
+    found = judged(part, "ros-jtc", Surroundings(surroundings(7).joints, HOME[7][others]))
+    told = [(each.kind, each.joint, each.message) for each in found.findings]
+    assert told == [("position", None, f"the joint 'joint_{missing + 1}' is missing")]
 
 
 @pytest.mark.parametrize(
@@ -216,16 +217,17 @@ def test_the_number_of_joints(profile: str, joints: int) -> None:
     period = {"ur-servoj": 2e-3}.get(profile, 1e-3)
     found = judged(motion(joints, period), profile).findings
     assert [
-        (each.rule.split("-", 1)[1], each.severity, each.kind, each.value)
+        (each.rule.split("-", 1)[1], each.severity, each.kind, each.joint, each.value)
         for each in found
         if "joints" in each.rule
-    ] == [("joints", "error", "position", joints)]
+    ] == [("joints", "error", "position", None, joints)]
 
 
+@pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("name", ["q", "qd", "qdd"])
-def test_a_point_without_a_number(name: str) -> None:
-    rows = with_value(CLEAN["ros-jtc"], name, 4, 2, np.nan)
-    breach = only(judged(rows, "ros-jtc"))
+def test_a_point_without_a_number(name: str, missing: float) -> None:
+    rows = with_value(CLEAN["ros-jtc"], name, 4, 2, missing)
+    (breach,) = [each for each in judged(rows, "ros-jtc").findings if each.rule == "jtc-complete-points"]
     assert (breach.rule, breach.joint, breach.row, breach.severity) == (
         "jtc-complete-points",
         "joint_3",
@@ -524,6 +526,7 @@ def test_rest_at_both_ends(profile: str, name: str, row: int, at: str) -> None:
         "joint_5",
     )
     assert breach.row == (1 if at == "start" else 1001)
+    assert f" 0.02 {'rad/s' if name == 'qd' else 'rad/s^2'}," in breach.message
 
 
 def test_rest_without_columns_is_seen_in_differences() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from heavy_arms import energy, gravity_effort, mass_matrix, random_arm, random_payload
 
-from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.dynamics.newton_euler import InverseDynamics, RigidSolid
 from trajcli.errors import InputError
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Payload, Robot, point_mass, unlimited
@@ -242,3 +242,50 @@ def test_impossible_payloads_are_refused(mass, inertia, message):
 @pytest.mark.parametrize("moments", [(0.0, 0.0, 0.0), (0.0, 1.0, 1.0), (1.0, 1.0, 2.0)])
 def test_point_rod_and_disc_are_possible(moments):
     assert Payload(1.0, np.zeros(3), np.diag(moments)).mass == 1.0
+
+
+MANY = 4096 + 300
+"""States, more than what is calculated at a time; some of them, the first and the last among these."""
+SOME = [0, 1, 4095, 4096, 4100, MANY - 1]
+
+
+def many_states(count):
+    """Return an arm of three joints in weight, and states of it, each (count, 3)."""
+    rng = np.random.default_rng(11)
+    dynamics = InverseDynamics(random_arm(rng, 3), rng.normal(size=3) * 9, random_payload(rng))
+    return dynamics, *rng.uniform(-3, 3, (3, count, 3))
+
+
+def test_each_of_many_states_has_its_own_efforts():
+    dynamics, q, qd, qdd = many_states(MANY)
+    efforts, matrices = dynamics.effort(q, qd, qdd), dynamics.mass_matrix(q)
+    weights = dynamics.gravity_effort(q)
+    for row in SOME:
+        close(efforts[row], dynamics.effort(q[row], qd[row], qdd[row]))
+        close(weights[row], gravity_effort(dynamics, q[row]))
+        close(matrices[row], mass_matrix(dynamics, q[row]))
+
+
+def test_parts_of_many_states_are_apart():
+    """Both parts of a state, and the three of a point of a path, are calculated together: in several steps here."""
+    dynamics, q, qd, qdd = many_states(MANY)
+    moved, held = dynamics.apart_from_gravity(q, qd, qdd)
+    a, b, weight = dynamics.along_path(q, qd, qdd)
+    for row in SOME:
+        matrix = mass_matrix(dynamics, q[row])
+        fast = dynamics.coriolis(q[row], qd[row])
+        for own in (held[row], weight[row]):
+            close(own, gravity_effort(dynamics, q[row]))
+        for own in (moved[row], b[row]):
+            close(own, matrix @ qdd[row] + fast, 1e-9)
+        close(a[row], matrix @ qd[row], 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sizes_of_a_point_mass_in_any_direction(seed):
+    """A mass m at p has the first moment m p, and moments of inertia m p^2 about what is square to p; 0 about p."""
+    x, y, z = p = np.random.default_rng(seed).normal(size=3)
+    mass = 2.5
+    second = mass * np.array([y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
+    sizes = RigidSolid(mass, tuple((mass * p).tolist()), tuple(second.tolist())).sizes
+    assert sizes == pytest.approx([mass, mass * np.linalg.norm(p), mass * p @ p, mass * p @ p / 2], rel=1e-12)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from counted_calls import calls_of
 
 import trajcli
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import Joint, Limits, Robot
+from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 T = 0.02 * np.arange(50)
@@ -104,6 +108,8 @@ def test_a_doubled_time_is_a_finding() -> None:
         ({"times": np.append(T[:-1], np.inf)}, r"times\[49\] is not a finite number"),
         ({"qdd": np.full_like(Q, np.nan), "qd": QD}, r"qdd\[0, 0\]"),
         ({"q": Q.astype(str)}, "expected an array of numbers"),
+        ({"qd": QD > 0}, "qd: expected an array of numbers"),
+        ({"times": T[:, None]}, r"times: expected shape \(N,\)"),
         ({"robot": "pandaa"}, "no robot"),
         ({"limits": {"velocty": 1}}, "velocty"),
         ({"limits": 3}, "expected a mapping"),
@@ -139,7 +145,12 @@ def test_limits_are_those_of_the_call_whatever_numpy_prints_of_them(digits: int)
     ]
     with np.printoptions(precision=digits, suppress=True):
         for limit, verdict in wanted:
-            for velocity in (np.full(7, limit), dict(zip(robot.joint_names, np.full(7, limit), strict=True))):
+            pairs = [np.array([-limit, limit])] * 7
+            for velocity in (
+                np.full(7, limit),
+                dict(zip(robot.joint_names, np.full(7, limit), strict=True)),
+                pairs,
+            ):
                 assert trajcli.check(T, fast, robot=robot, limits={"velocity": velocity}).verdict == verdict
 
 
@@ -177,3 +188,28 @@ def test_times_of_single_precision_explain_velocities_between_them(*, single: bo
         rounded if single else rounded.astype(np.float64), meant[:, None], limits={"velocity": 1.0}
     )
     assert found.verdict == ("within rounding" if single else "exceeded")
+
+
+def test_two_rows_are_a_motion() -> None:
+    assert trajcli.check(T[:2], Q[:2], robot="panda").rows == 2
+
+
+def test_a_file_of_a_robot_that_was_changed_is_read_anew(tmp_path: Path) -> None:
+    file, fastest = tmp_path / "robot.yaml", float(np.abs(np.diff(Q[:, 0])).max() / 0.02)
+    for number, (share, verdict) in enumerate([(1.01, "satisfied"), (0.99, "exceeded"), (1.01, "satisfied")]):
+        joints = ", ".join([f"{{velocity: {share * fastest}}}"] * 7)
+        file.write_text(f"{{convention: standard, joints: [{joints}]}}", encoding="utf-8")
+        os.utime(file, (number, number))
+        assert trajcli.check(T, Q, robot=file).verdict == verdict
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(1.01, "satisfied"), (0.99, "exceeded")])
+def test_the_tool_of_an_arm_keeps_its_limits(share: float, verdict: str) -> None:
+    """A wheel of a radius of 0.5 m at 2 rad/s."""
+    joint, limits = Joint("turn", "revolute", a=0.5), replace(unlimited(1), tcp=ToolLimits(speed=share))
+    wheel = Robot("wheel", (joint,), limits, "standard", np.eye(4), np.eye(4))
+    found = trajcli.check(T, 2.0 * T[:, None], robot=wheel, qd=np.full((50, 1), 2.0))
+    assert found.verdict == verdict
+    assert {each.kind for each in found.findings if each.severity == "error"} == (
+        {"tool_speed"} if share < 1 else set()
+    )

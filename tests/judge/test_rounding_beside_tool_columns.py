@@ -149,3 +149,21 @@ def test_rates_beside_positions_alone_are_off_by_the_rounding_of_both(
         table = ToolTable(columns, np.full(len(columns), of_columns), lambda rounded=rounded: [rounded])
         found = judge_tool_columns([motion], table, wheel(1.0), None, wheel(1.0))
         assert {each.kind for each in found} == ({"derivative"} if factor != 1.0 else set())
+        numbers = [each.amounts[key] for each in found for key in ("value", "limit")]
+        assert {getattr(number, "dimension", None) for number in numbers} <= {
+            "angle" if name in ("wz", "ez") else "length"
+        }
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_row_that_rounding_explains_least_is_named(order: int) -> None:
+    """A slow row that is off by a little more than its slack, ten times, beside a fast one that is off by as much as twice."""
+    rates = np.abs(states()[1]).sum(axis=1)
+    slow, fast = (int(at) for at in (rates.argmin(), rates.argmax()))
+    assert rates[fast] > 8 * rates[slow]
+    values = true_columns(1.0)
+    for row, share in ((slow, 10.0), (fast, 2.0)):
+        values[row, NAMES.index("vx")] += order * share * (4.0 * OFF * rates[row] + EXACT)
+    (found,) = findings(1.0, values, (OFF, 0.0, 0.0))
+    assert (found.row, found.count) == (slow + 1, 2)
+    assert found.value == pytest.approx(10.0 * (found.limit or 0.0), rel=1e-6)

@@ -18,7 +18,7 @@ from trajcli.kinematics.columns import (
     uncombine,
 )
 
-NUMBERS = (0.0, 1.0, -1.0, 2.5)
+NUMBERS = (0.0, 1.0, -1.0, 2.0, -2.5)
 SHAPES = ((5,), (2, 5), (2, 1, 5), (2, 2, 5))  # poses alone, and behind axes of choices
 
 

@@ -244,7 +244,7 @@ class AtRest(RuleCheck):
             over = np.zeros((rows.t.size, rows.q.shape[1]), dtype=bool)
             over[index] = np.abs(values) > allowed
             size = np.zeros(over.shape)
-            size[index] = np.abs(values) / allowed
+            size[index] = np.abs(values) / np.maximum(allowed, 1e-300)
 
             def fields(
                 index: int,
