@@ -208,6 +208,17 @@ def test_a_row_at_either_end_approaches_too_fast(at: float, side: int) -> None:
 
 
 @pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("at", [0.15, 0.85])
+def test_a_row_that_moves_away_as_fast_does_not_approach(at: float, side: int) -> None:
+    """Forward at 1 in a piece, and backward at 1.17 in one of the rows beside it: the law changes between them."""
+    motion = peaked(1, 2, LAW, side, at=at, bent=300.0)
+    assert (side * motion.qd).min() < -1.1
+    (found,) = over(motion, bare_robot(approach(side, PEAK - OVER)))
+    assert (found.kind, found.severity) == ("velocity_by_position", "warning")
+    assert found.value == pytest.approx(side * PEAK)
+
+
+@pytest.mark.parametrize("side", SIDES)
 def test_an_approach_in_a_later_move_has_its_own_place(side: int) -> None:
     """At 0.5 s the second joint is 0.02 m before its end, where 0.2 m/s are allowed, at 0.4 m/s."""
     t = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
@@ -313,6 +324,32 @@ def test_forces_of_other_joints_say_nothing_about_this_one(side: int) -> None:
 
 
 @pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("rounding", "severity"), [(1e-6, "error"), (2e-4, "warning")])
+def test_a_force_that_rows_have_but_for_their_rounding_is_one_of_the_curve_alone(
+    rounding: float, severity: str, side: int
+) -> None:
+    """Rows state 2.5e-4 of an acceleration more than is allowed, and the curve 1e-2."""
+    motion, exact = peaked(2, 3, LAW, side, bent=3.9), np.zeros(1)
+    motion = replace(motion, resolution=Resolution(0.0, exact, exact, exact + rounding))
+    (found,) = over(motion, slides(side, MASS * (PEAK - OVER)))
+    assert (found.kind, found.severity, found.certainty) == ("effort", severity, "exceeded")
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_of_both_directions_of_a_force_that_counts_which_is_exceeded_more(side: int) -> None:
+    """A force of 1.5 where 1 is allowed, and of 11 where 10 are: half as much again is more than a tenth."""
+    t = PERIOD * np.arange(8)
+    qdd = side * np.array([0.0, 1.5, 1.5, 0.0, -11.0, -11.0, 0.0, 0.0]) / MASS
+    qd = np.append(0.0, np.cumsum(PERIOD * (qdd[1:] + qdd[:-1]) / 2))
+    q = np.append(0.0, np.cumsum(PERIOD * (qd[1:] + qd[:-1]) / 2 - PERIOD**2 * np.diff(qdd) / 12))
+    robot = slides(1, FAR)
+    effort = np.array([sorted([side * 1.0, -side * 10.0])])
+    robot = replace(robot, limits=replace(robot.limits, effort=effort))
+    (found,) = over(motion_of(*(each[:, None] for each in (q, qd, qdd)), t=t), robot)
+    assert [found.value, found.limit] == pytest.approx([side * 1.5, side * 1.0], rel=1e-5)
+
+
+@pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("row", [0, 3, 5])
 def test_one_row_that_states_the_force_is_enough(row: int, side: int) -> None:
     """An acceleration that is largest in one row, linear beside it; the first and the last one count, too."""
@@ -396,3 +433,31 @@ def test_no_row_says_when_a_payload_changed() -> None:
     assert [found.kind for found in over(motion, same, by_move={0: same, 1: same})] == ["effort"]
     assert over(motion, same, by_move={0: same, 1: carrying}) == []
     assert over(motion, same, by_move={0: carrying, 1: same}) == []
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("speed", "goes_back"), [(5e-10, False), (1e-7, True), (1e-5, True)])
+def test_a_row_goes_back_if_its_speed_is_more_than_nine_decimals_leave_of_rest(
+    speed: float, goes_back: bool, side: int
+) -> None:
+    """As above with exact rows: 19 N, and 21 N if the last row goes back."""
+    last = 7
+    motion = braked(side, PERIOD * last * 10.0, 10.0)
+    qd = motion.qd.copy()
+    qd[last] = -side * speed
+    found = over(replace(motion, qd=qd), rubbing(-side, 20.5, Friction(1.0, 0.0)))
+    assert [each.severity for each in found] == ["error"] * goes_back
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("friction", [Friction(3.0, 0.0), Friction(0.0, 3.0)])
+def test_friction_is_that_of_velocities_where_rows_have_no_accelerations(
+    friction: Friction, side: int
+) -> None:
+    """A slide at a steady 1 m/s, far on the other side of zero: 3 N, whatever its place is."""
+    t = PERIOD * np.arange(6)
+    motion = motion_of(side * (t - 5.0)[:, None], np.full((6, 1), side * 1.0), t=t)
+    (found,) = over(motion, rubbing(side, 2.9, friction))
+    assert (found.kind, found.severity) == ("effort", "error")
+    assert found.value == pytest.approx(side * 3.0, rel=1e-6)
+    assert over(motion, rubbing(side, 3.1, friction)) == []
