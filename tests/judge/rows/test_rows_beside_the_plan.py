@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 import random_jobs
 from numpy.typing import NDArray
+from planned_examples import planned_with_output
 from tiers import few
+from two_moves import TWO_MOVES
 
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.rows.planned_rows import RowComparison, compare_with_plan
+from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.byte_source import ByteSource
 
@@ -276,3 +279,40 @@ def test_a_joint_that_stands_beyond_its_range_is_beyond_it(
     file.write_text("t,q1,q2\n" + "\n".join(rows) + "\n", encoding="utf-8")
     options = CheckOptions(robot=str(robot), limits=str(limits))
     assert check_file(str(file), options).judgement.verdict == verdict
+
+
+@pytest.mark.parametrize("wrong", [None, "q2", "qd1", "qd3", "qdd1"])
+def test_rows_from_the_end_to_the_start_are_told_to_be_it_backward(
+    wrong: str | None, plan: Plan, tmp_path: Path
+) -> None:
+    """As time goes back velocities change their sign, and positions and accelerations do not."""
+    rows = rows_at(10.0)[::-1].copy()  # the last interval is half as long, and stands first now
+    rows[:, 0] = rows[0, 0] - rows[:, 0]
+    rows[:, 4:7] *= -1.0
+    if wrong is not None:
+        rows[:, NAMES.index(wrong)] *= -1.0
+    said = compared(tmp_path, plan, rows).difference or ""
+    assert ("they are it backward" in said) == (wrong is None)
+
+
+ODD = ("qd", "v", "w", "sd_")
+"""What names of first derivatives begin with, besides those of second ones."""
+
+
+@pytest.mark.parametrize("wrong", [None, "qd6_deg", "vx_mm", "wz_deg", "sd_mm", "ay_mm", "ez_deg", "z_mm"])
+def test_rows_of_a_tool_from_the_end_to_the_start_are_told_to_be_it_backward(
+    wrong: str | None, tmp_path: Path
+) -> None:
+    made = planned_with_output(TWO_MOVES, "{rate: 7, columns: [t, qd, pose, twist, twistd, path, move]}")
+    file = tmp_path / "rows.csv"
+    write_plan(made, str(file))
+    head, *lines = file.read_text(encoding="utf-8").splitlines()
+    names, rows = (
+        head.split(","),
+        np.array([[float(cell) for cell in line.split(",")] for line in lines[::-1]]),
+    )
+    rows[:, 0] = rows[0, 0] - rows[:, 0]
+    for k, name in enumerate(names):
+        rows[:, k] *= -1.0 if name.startswith(ODD) is not (name == wrong) else 1.0
+    said = compared(tmp_path, made, rows, names=names).difference or ""
+    assert ("they are it backward" in said) == (wrong is None), said
