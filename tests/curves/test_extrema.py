@@ -391,3 +391,21 @@ def test_a_joint_has_its_peaks_whatever_the_size_of_the_others(size: float) -> N
     np.testing.assert_allclose(found.low / [1.0, size, 1.0], [low, low, -high], rtol=1e-12)
     np.testing.assert_allclose(found.high_time, [0.2, 0.2, 0.8], rtol=1e-9)
     np.testing.assert_allclose(found.low_time, [0.8, 0.8, 0.2], rtol=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_of_many_pieces_each_order_is_looked_at_where_it_has_a_peak(order: int, sign: float) -> None:
+    """In the middle of a hundred pieces a derivative goes from 0 to 1 and back, 16 u^2 (1 - u)^2.
+
+    The lower ones are largest and smallest elsewhere: what there is of them in between is not looked at.
+    """
+    bump = Polynomial([0.0, 0.0, 16.0, -32.0, 16.0]).integ(order).coef[::-1]
+    coefficients = np.zeros((5 + order, 100, 1))
+    coefficients[:, 50, 0] = sign * bump
+    for lower in range(order):
+        coefficients[-1 - lower, 0], coefficients[-1 - lower, 99] = 1e3, -1e3
+    found = peaks(PiecewisePolynomial(np.arange(101.0), coefficients), (0, 1, 2, 3))[order]
+    values, times = (found.high, found.high_time) if sign > 0 else (found.low, found.low_time)
+    assert values[0] == pytest.approx(sign, rel=1e-12)
+    assert times[0] == pytest.approx(50.5, abs=1e-6)

@@ -132,6 +132,23 @@ def test_a_curve_does_not_change_with_the_arrays_that_made_it(frozen):
         curve.breaks[0] = 5.0
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.int64])
+def test_numbers_of_another_kind_are_kept_as_float64(kind):
+    """0.1 of float32 is another number than that of float64, and all that follows is as exact as the latter."""
+    breaks, rows = np.array([0, 1, 3], dtype=kind), np.full((2, 2, 1), 7, dtype=kind)
+    for each in (breaks, rows):
+        each.flags.writeable = False
+    curve = PiecewisePolynomial(breaks, rows)
+    assert (curve.breaks.dtype, curve.coefficients.dtype) == (np.float64, np.float64)
+    assert curve.evaluate(0.1).tolist() == [7 * 0.1 + 7]
+    assert curve.degree == 1
+
+
+def test_breaks_stand_in_one_row():
+    with pytest.raises(ValueError, match="do not fit"):
+        PiecewisePolynomial(np.array([[0.0, 1.0, 2.0]]), np.ones((1, 2, 1)))
+
+
 @pytest.mark.parametrize(
     ("pieces", "shape"), [(2, (1, 3, 1)), (2, (1, 1, 1)), (2, (2, 2)), (2, (1, 1, 2, 1)), (1, (2,))]
 )

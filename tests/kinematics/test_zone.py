@@ -322,3 +322,42 @@ def test_what_is_more_than_enough_is_told_to_a_millionth(enough):
     around = ZoneAround(arm(LEVER), np.zeros(1), Zone(joints=(0.2,)))
     found, _ = around.largest_share(bump([0.1]), enough)
     assert 0.5 * (1 - 1e-9) <= found <= max(0.5 * (1 + 2e-6), enough)
+
+
+@pytest.mark.parametrize("angle", [0.5, 1.5, 2.0, 2.5, 3.1, -2.5])
+def test_an_angle_is_that_of_the_turn_up_to_half_a_turn(angle):
+    """One joint turns the tool on a lever of 1 m: its chord is 2 sin(angle / 2)."""
+    distance, turned = ZoneAround(arm(LEVER), np.full(1, 0.3), Zone()).offsets(np.array([[0.3 + angle]]))
+    assert turned == pytest.approx([abs(angle)])
+    assert distance == pytest.approx([2 * np.sin(abs(angle) / 2)])
+
+
+@pytest.mark.parametrize("alone", ["position", "orientation", "joints"])
+@pytest.mark.parametrize("over", [0.01, -0.01])
+def test_one_measure_of_a_zone_is_enough_to_leave_it(alone, over):
+    """0.3 rad of a lever of 1 m, by a chord of 2 sin 0.15."""
+    size = {"position": 2 * np.sin(0.15), "orientation": 0.3, "joints": 0.3}[alone] - over
+    zone = Zone(**{alone: (size,) if alone == "joints" else size})
+    held = ZoneAround(arm(LEVER), np.zeros(1), zone).holds(np.array([[0.3], [-0.3]]), np.zeros((2, 2)))
+    assert held.tolist() == [over < 0] * 2
+
+
+@pytest.mark.parametrize("begins", [0.0, 2.0, -3.0])
+def test_the_time_is_that_of_the_curve_whenever_that_begins_and_however_long_its_pieces_are(begins):
+    """At 1 rad/s for 1 s and for 3 s more; a bump as high in the middle of 1 s that follow."""
+    breaks = begins + np.array([0.0, 1.0, 4.0, 5.0])
+    line = np.array([[0.0, 0.0, -4.4], [1.0, 1.0, 4.4], [0.0, 1.0, 0.0]])[:, :, None]
+    around = ZoneAround(arm(LEVER), np.zeros(1), Zone(joints=(2.0,)))
+    share, when = around.largest_share(PiecewisePolynomial(breaks, line))
+    assert (share, when) == (pytest.approx(2.0), pytest.approx(begins + 4.0))
+    share, when = around.largest_share(PiecewisePolynomial(breaks[2:], 2.0 * line[:, 2:]))
+    assert (share, when) == (pytest.approx(1.1), pytest.approx(begins + 4.5, abs=0.05))
+
+
+def test_a_slide_that_stands_out_is_a_lever():
+    """By 5 m on an arm that turns by 1e-4 rad and back: the tool goes 5e-4 m away."""
+    curve = bump([1e-4, 0.0])
+    rows = curve.coefficients.copy()
+    rows[-1, :, 1] = 5.0
+    around = ZoneAround(arm(ACROSS, SLIDE), np.array([0.0, 5.0]), Zone(position=5e-4 / 1.1))
+    assert around.largest_share(PiecewisePolynomial(curve.breaks, rows))[0] == pytest.approx(1.1, rel=1e-3)

@@ -15,6 +15,7 @@ from tally import Tally
 from tiers import QUICK, few
 
 from trajcli.cli.explain import _lines
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.read import job_from_text
 from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
@@ -190,6 +191,7 @@ def test_a_motion_obeys_every_row_in_every_box_around_it(seed: int) -> None:
     allowed = duration**orders * (sides @ np.array([1.0, *outer]))
     scale = np.abs(A).max(axis=1).toarray()[:, 0]
     assert ((A @ found - allowed) / scale).max() <= 1e-9
+    assert np.abs(programme._distances @ found).max() <= 1e-9
     least, largest, own = programme.ranges(box)
     assert (found >= least * duration**own - 1e-9).all()
     assert (found <= largest * duration**own + 1e-9).all()
@@ -264,6 +266,16 @@ def test_a_start_in_motion_and_bent_paths_have_no_proof() -> None:
     assert not is_provable(replace(two, ends=(np.array([0.1, 0.0]), np.zeros(2))))
     assert not is_provable(replace(two, ends=(np.zeros(2), np.array([0.0, 0.1]))))
     assert not is_provable(replace(two, courses=two.courses[:1], corners=()))
+    for k, course in enumerate(two.courses):
+        line = course.curve.coefficients
+        rows = np.concatenate([line, line + np.array([0.0, 1.0])[:, None, None]], axis=1)
+        for bent in (
+            PiecewisePolynomial(np.array([0.0, 0.5, 1.0]), rows),
+            PiecewisePolynomial(np.array([0.0, 1.0]), np.concatenate([0.1 + 0.0 * line[:1], line])),
+        ):
+            courses = [*two.courses]
+            courses[k] = replace(course, curve=bent)
+            assert not is_provable(replace(two, courses=tuple(courses)))
     three = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0], [0.2, 1.0], zone=0.02, more_zones=True)).chain
     assert not is_provable(three)
 
@@ -334,6 +346,21 @@ def test_the_search_goes_down_to_the_least_of_all_boxes(
     known = 1.2
     found = least_duration(chain, known)
     assert 1.0 - 1e-4 <= found < 1.0  # what rounding may have added is taken off
+
+
+@pytest.mark.parametrize(("first", "later", "wanted"), [(1.1, 0.0, 1.1), (1.1, 1.05, 1.1), (1.2, 1.2, 1.2)])
+def test_what_is_known_of_a_box_is_known_of_its_halves(
+    first: float, later: float, wanted: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where their own programmes prove less; a duration that all boxes reach is that of the motion."""
+    chain = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0])).chain
+
+    def found(_: ShareProgramme, box: ShareBox, *__: float) -> float:
+        return first if max(np.subtract(box.high, box.low)) == 1.0 else later
+
+    monkeypatch.setattr(proven_bound, "_PROGRAMMES", ((0.0, 60),))
+    monkeypatch.setattr(ShareProgramme, "least_duration", found)
+    assert least_duration(chain, 1.2) == pytest.approx(wanted, rel=1e-6)
 
 
 @pytest.mark.parametrize("corner", CORNERS)
