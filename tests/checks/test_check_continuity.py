@@ -318,6 +318,8 @@ def test_times_count_from_the_start_of_the_trajectory() -> None:
 def test_limits_must_be_as_many_as_moves() -> None:
     with pytest.raises(ValueError, match="2 limits for 1 moves"):
         check_continuity(trajectory(between([0.0], [1.0])), [FREE, FREE])
+    with pytest.raises(ValueError, match="0 limits for 1 moves"):
+        acceleration_steps(trajectory(between([0.0], [1.0])), [])
 
 
 @settings(max_examples=60, deadline=None)
@@ -429,3 +431,24 @@ def test_each_joint_of_each_move_has_its_own_jump_and_what_rounding_explains_of_
     assert [f.value for f in found] == pytest.approx([0.1] * 3 + [*(0.1 * ways)] * 2)
     furthest = 0.1 + 3.2 * ways
     assert [f.limit for f in found] == pytest.approx([*(1e-9 * furthest)] * 3, rel=1e-2)
+
+
+@pytest.mark.parametrize("begins", [0.0, 1e6])
+@pytest.mark.parametrize(("units", "found"), [(1.0, 0), (6.0, 1)])
+def test_breaks_are_as_exact_as_the_time_at_which_they_stand(units: float, found: int, begins: float) -> None:
+    """A ramp of some units in the last place of its times, and a position that is late by one of them, or by six."""
+    unit = np.spacing(begins + 1.0)
+    speed = 1e-4 / unit
+    late = units * 1e-4
+    breaks = begins + 1.0 + unit * np.array([0.0, 8.0])
+    curve = PiecewisePolynomial(
+        np.array([begins, *breaks, begins + 2.0]),
+        np.array([[0.0, speed, 0.0], [2.0, 2.0 + late, 2.0 + late + 8e-4]])[:, :, None],
+    )
+    plain = between([0.0], [1.0])
+    whole = replace(trajectory(plain, start=state([2.0]), end=state([2.0 + late + 8e-4])), curve=curve)
+    told = [each for each in check_continuity(whole, [FREE]) if each.kind == "position_jump"]
+    assert len(told) == found
+    for each in told:
+        assert each.time == pytest.approx(1.0)
+        assert "at t = 1 s" in each.text()

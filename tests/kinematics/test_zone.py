@@ -352,6 +352,7 @@ def test_the_time_is_that_of_the_curve_whenever_that_begins_and_however_long_its
     assert (share, when) == (pytest.approx(2.0), pytest.approx(begins + 4.0))
     share, when = around.largest_share(PiecewisePolynomial(breaks[2:], 2.0 * line[:, 2:]))
     assert (share, when) == (pytest.approx(1.1), pytest.approx(begins + 4.5, abs=0.05))
+    assert around.largest_share(PiecewisePolynomial(breaks[:2], np.zeros((1, 1, 1)))) == (0.0, begins)
 
 
 def test_a_slide_that_stands_out_is_a_lever():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -233,6 +234,10 @@ def test_the_joint_whose_blend_is_shortened_is_named() -> None:
     made = plan(start, {"planner": "blends", "through": through, "acceleration": [20, 1]})
     (event,) = [event for event in made.moves[0].planned.events if event.kind == "shrunk"]
     assert event.amounts["joint"] == "j2"
+    assert event.message.endswith("; 2 more likewise")  # the blends at both ends, for which 0.5 s are left
+    both = plan(start, {"planner": "blends", "through": through, "acceleration": [1, 1]})
+    (event,) = [event for event in both.moves[0].planned.events if event.kind == "shrunk"]
+    assert event.message.endswith("; 5 more likewise")
 
 
 @pytest.mark.parametrize("backwards", [False, True])
@@ -245,6 +250,7 @@ def test_the_least_acceleration_that_a_refusal_names_is_enough(backwards: bool, 
     move = {"planner": "blends", "through": through, "end_blends": "inside"}
     (problem,) = refusal(start, move | {"acceleration": 0.4}).problems
     assert f"inside the {'last' if backwards else 'first'} segment" in problem.text()
+    assert "of j1, 0.4 rad/s^2, is too small" in problem.text()
     least = float(re.search(r"it takes (\S+) rad/s\^2", problem.text()).group(1))
     assert plan(start, move | {"acceleration": least}).verdict.passed
     refusal(start, move | {"acceleration": least * (1 - 1e-4)})
@@ -282,3 +288,63 @@ def test_points_that_are_all_one_last_as_long_as_the_move_says() -> None:
         {"joints": [0.5, 0.5]}, {"planner": "blends", "through": points, "duration": 1.75}, limits=limits
     )
     assert made.trajectory.duration == 1.75
+
+
+def test_the_joint_whose_acceleration_is_too_small_is_named() -> None:
+    start, through = timed([0, 1, 4], [[0.0, 0.0], [0.01, 0.8], [0.02, 0.9]])
+    move = {"planner": "blends", "through": through, "end_blends": "inside", "acceleration": 0.4}
+    (problem,) = refusal(start, move).problems
+    assert problem.joint == "j2"
+    assert "acceleration of j2, 0.4 rad/s^2, is too small" in problem.text()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    "limits", [{"velocity": 0.5, "acceleration": 50}, {"velocity": 50, "acceleration": 0.5}]
+)
+def test_a_way_with_blends_about_its_ends_uses_its_limits(limits: dict[str, float], sign: float) -> None:
+    """One way that begins and ends with half a blend beyond its points: D / T is its speed, by T / 7 or more in a blend."""
+    move = {"planner": "blends", "through": [{"joints": [sign * 2.0]}], "exactly": True}
+    curve = curve_of(plan({"joints": [0]}, move, limits=limits | {"jerk": None}))
+    speed, steepest = (np.abs(np.concatenate(curve.piece_ends(order))).max() for order in (1, 2))
+    used = max(speed / limits["velocity"], steepest / limits["acceleration"])
+    assert used == pytest.approx(1.0, rel=1e-6)
+
+
+def test_accelerations_of_blends_step_and_velocities_do_not() -> None:
+    start, through = timed([0, 1, 2, 4], POINTS)
+    made = plan(start, {"planner": "blends", "through": through, "blend_durations": 0.2})
+    curve = curve_of(made)
+    steps = []
+    for order in range(3):
+        begins, ends = curve.piece_ends(order)
+        steps.append(np.abs(begins[1:] - ends[:-1]).max())
+    assert max(steps[:2]) < 1e-9 < 0.1 < steps[2]
+    assert made.loaded.job.moves[0].continuity == 1
+
+
+@pytest.mark.parametrize("fields", [{"blend_durations": 0.95}, {"acceleration": [40, 60]}])
+def test_phases_follow_each_other_from_the_start_on(fields: dict[str, object]) -> None:
+    start, through = timed([0, 1, 2, 4], POINTS)
+    made = plan(start, {"planner": "blends", "through": through, **fields})
+    phases = made.moves[0].planned.phases
+    for joint in {phase.joint for phase in phases}:
+        own = [phase for phase in phases if phase.joint == joint]
+        assert own[0].start == 0.0
+        assert own[-1].end <= curve_of(made).end * (1 + 1e-12)
+        assert all(one.end == other.start for one, other in pairwise(own))
+
+
+def test_a_joint_that_rests_needs_no_acceleration() -> None:
+    start, through = timed([0, 1, 2, 4], [[q, 0.5] for q, _ in POINTS])
+    limits = {"acceleration": [9, None], "jerk": None}
+    made = plan(start, {"planner": "blends", "through": through}, limits=limits)
+    assert largest(made) == pytest.approx(9.0)
+    assert (curve_of(made).evaluate(np.linspace(0, curve_of(made).end, 9))[:, 1] == 0.5).all()
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_a_list_of_blends_has_one_for_each_point(count: int) -> None:
+    start, through = timed([0, 1, 2, 4], POINTS)
+    move = {"planner": "blends", "through": through, "blend_durations": [0.1] * count}
+    assert f"expected 4 durations, start and target included, got {count}" in str(refusal(start, move))
