@@ -118,22 +118,24 @@ def test_what_is_proven_of_a_distance_counts_where_it_is_above_the_rows(
 
 def test_a_tool_that_is_too_fast_in_a_segment_is_found_with_all_else() -> None:
     tool = beside(SLIDES, [2 * PROMISED, 0.0, 0.0], 4 * U * (1 - U), 0)
-    peak = BoundedPeak(2.0, 0.5, 2.0, np.zeros(3))
+    peak = BoundedPeak(2.0, 0.5, 2.25, np.zeros(3))
     vars(tool)["speed_runs"] = (
         SpeedRun((0, 0), (0.0, 1.0), (0.0, 1.0), (3.0, 1.0), (peak, peak)),
         SpeedRun((1, 2), (1.0, 2.0), (1.0, 2.0), (1.0, 1.0), (peak, peak)),
     )
-    assert [(each.kind, each.move) for each in check_tool(tool)] == [
-        ("tool_path", 4),
-        ("tool_angular_speed", 4),
-        ("tool_speed", 4),
-        ("tool_angular_speed", 4),
+    path, *fast = check_tool(tool)
+    assert (path.kind, path.move) == ("tool_path", 4)
+    assert [(each.kind, each.move, each.text().split(":")[0]) for each in fast] == [
+        ("tool_angular_speed", 4, "segment 0"),
+        ("tool_speed", 4, "segments 1 to 2"),
+        ("tool_angular_speed", 4, "segments 1 to 2"),
     ]
+    assert {(each.value, each.limit, each.time) for each in fast} == {(2.25, 1.0, BEGINS + 0.5)}
 
 
 def test_a_change_of_the_branch_is_that_of_its_move() -> None:
     tool = beside(SLIDES, np.zeros(3), U, 0)
     vars(tool)["determinants"] = np.where(np.arange(tool.times.size) < 9, 1.0, -1.0)
     (found,) = check_tool(tool)
-    assert (found.kind, found.move) == ("branch", 4)
+    assert (found.kind, found.move, found.method) == ("branch", 4, "sampled")
     assert found.time == pytest.approx(BEGINS + 1.0)

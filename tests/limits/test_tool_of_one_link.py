@@ -195,3 +195,13 @@ def test_intervals_of_speed_have_the_times_of_the_joints_whenever_the_law_begins
     assert (first.limits, second.limits) == ((7.0, 9.0), (8.0, 6.0))
     for run, rate in ((first, 1.0), (second, 3.0)):
         assert [peak.upper_bound for peak in run.peaks] == pytest.approx([LEVER * rate, rate], rel=1e-6)
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e-9])
+def test_a_piece_of_a_short_time_is_one_with_a_speed_of_its_own(length: float) -> None:
+    """40 rad/s for a nanosecond between two rests."""
+    rows = np.zeros((2, 3, 2))
+    rows[0, 1, 0] = 40.0
+    found = tool_bounds(arm(), np.array([0.0, 0.1, 0.1 + length, 0.2]), rows)
+    assert [found[0].upper_bound, found[1].upper_bound] == pytest.approx([LEVER * 40.0, 40.0], rel=1e-6)
+    assert found[0].time == pytest.approx(0.1, abs=2 * length)
