@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import trajcli
-from trajcli.errors import MissingLimitError, TrajcliError
+from trajcli.errors import MissingLimitError, PlanningError, TrajcliError
 from trajcli.job.read import job_from_text
 from trajcli.planners.fastest_through_points import assembly
 from trajcli.trajectory import State
@@ -171,3 +172,46 @@ def test_minimum_durations_and_polylines_are_not_flown_by() -> None:
     assert planner_of(minimum_durations=[0, 1, 0]).why_not_flown_by == "its `minimum_durations` are given"
     assert planner_of(straight=True).why_not_flown_by.startswith("it keeps to the polyline")
     assert planner_of().why_not_flown_by is None
+
+
+@pytest.mark.parametrize("at_target", [False, True])
+def test_a_time_is_underlined_where_it_stands(at_target: bool) -> None:
+    through, target = [dict(each) for each in POINTS[:2]], dict(POINTS[2])
+    (target if at_target else through[0])["time"] = 1.625
+    text, source = refusal(through, to=target)
+    assert "finds the times" in text
+    assert source.startswith("1.625")
+
+
+def test_times_of_a_recording_do_not_bind(tmp_path: object) -> None:
+    """Nor must the target that comes after it have one."""
+    (tmp_path / "points.csv").write_text("t,q1,q2,q3\n50,0.5,0.2,0.4\n90,0.5,0.6,0.1\n")
+    (tmp_path / "job.json").write_text(json.dumps(job({"csv": "points.csv"}, to=POINTS[2])))
+    timed, free = trajcli.plan(tmp_path / "job.json"), trajcli.plan(job())
+    assert timed.trajectory.duration == pytest.approx(free.trajectory.duration, rel=1e-6)
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_phases_follow_each_other_to_the_end_with_the_jerk_that_they_name(straight: bool) -> None:
+    planned = trajcli.plan(job(straight=straight)).moves[0].planned
+    joints = {phase.joint for phase in planned.phases}
+    assert joints == ({None} if straight else {1, 2})
+    for joint in joints:
+        own = [phase for phase in planned.phases if phase.joint == joint]
+        assert (own[0].start, own[-1].end) == (0.0, pytest.approx(planned.curve.end))
+        assert all(one.end == pytest.approx(other.start) for one, other in pairwise(own))
+        for phase in own:
+            jerk = planned.curve.evaluate((phase.start + phase.end) / 2, 3)[joint or slice(1, None)]
+            assert (np.abs(jerk).max() > 1e-6) == phase.name.startswith("jerk")
+
+
+def test_a_path_has_its_points_as_far_off_as_the_motion() -> None:
+    plan = trajcli.plan(job())
+    planner, planned = plan.loaded.job.moves[0], plan.moves[0].planned
+    missed = 1e-3 * np.arange(12.0).reshape(4, 3)
+    off = replace(planned, via_points=replace(planned.via_points, missed=missed))
+    course = planner.course(np.zeros(3), plan.loaded.robot, off)
+    np.testing.assert_array_equal(course.passed.missed, missed[1:-1])
+    np.testing.assert_array_equal(course.passed.points, [each["joints"] for each in POINTS[:2]])
+    with pytest.raises(PlanningError, match="no path to follow"):
+        planner.course(np.zeros(3), plan.loaded.robot, replace(planned, via_points=None))
