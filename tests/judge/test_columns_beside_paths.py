@@ -14,9 +14,11 @@ import pytest
 from line_of_ur5e import plan
 
 from trajcli.columns import parse_column
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
 from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
 from trajcli.judge.tool_columns import ToolTable, judge_tool_columns
+from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.robot import Joint, MountedTool, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution, blocks_of_size
@@ -33,7 +35,7 @@ def judged(
     values: np.ndarray,
     moves: np.ndarray,
     tolerance: Tolerance | None = None,
-    paths: dict[int, None] | None = None,
+    paths: dict[int, ToolMotion | None] | None = None,
 ) -> list[Finding]:
     """Return what columns beside joints are found to be wrong, in blocks of a hundred rows."""
     nothing = np.zeros(q.shape[1])
@@ -108,6 +110,25 @@ def test_each_move_has_a_law_of_its_own(wrong: int | None) -> None:
     assert {(each.kind, each.move) for each in found} == (
         {("derivative", wrong)} if wrong is not None else set()
     )
+
+
+@pytest.mark.parametrize(("rates", "on_path"), [((0.0, -1.0), True), ((0.1, 0.0), True), ((0.0, 0.0), False)])
+@pytest.mark.parametrize("row", [40, 150, 200])
+def test_a_row_that_only_begins_to_stand_at_the_border_of_a_zone_is_on_its_path(
+    row: int, rates: tuple[float, float], *, on_path: bool
+) -> None:
+    """In a zone a distance stands: it has neither a velocity nor an acceleration, and the tool may be turned there."""
+    q, s = driven(1)
+    of_plan, tolerance = plan().moves[0].planned.tool, Tolerance(1e-3, 1e-6)
+    law = of_plan.law
+    until = PiecewisePolynomial(law.breaks, law.coefficients * (s[row, 0] / of_plan.path.length))
+    q[row] += 5e-4 * LAST
+    s[row, 1:] = rates
+    arms = ArmsOfMoves(plan().moves[0].robot, [])
+    path = replace(of_plan, law=until, tolerance=tolerance)
+    found = judged(arms, q, "s sd sdd", s, np.zeros(COUNT, dtype=int), paths={0: path})
+    turned = [(each.row, each.value) for each in found if each.quantity == "orientation"]
+    assert turned == ([(row + 1, pytest.approx(5e-4, rel=1e-2))] if on_path else [])
 
 
 @pytest.mark.parametrize("off", [0.0, 2e-9, -2e-9])

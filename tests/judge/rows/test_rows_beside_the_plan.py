@@ -15,11 +15,15 @@ from planned_examples import planned_with_output
 from tiers import few
 from two_moves import TWO_MOVES
 
+from trajcli.columns import GROUPS, columns_of
 from trajcli.judge.file import CheckOptions, check_file
+from trajcli.judge.rows import planned_rows
 from trajcli.judge.rows.planned_rows import RowComparison, compare_with_plan
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
+from trajcli.streams import npy
 from trajcli.streams.byte_source import ByteSource
+from trajcli.units import Units
 
 START, END = np.array([0.1, 0.25, -0.4]), np.array([1.3, 0.25, 0.9])
 DURATION = 1.25
@@ -316,3 +320,160 @@ def test_rows_of_a_tool_from_the_end_to_the_start_are_told_to_be_it_backward(
         rows[:, k] *= -1.0 if name.startswith(ODD) is not (name == wrong) else 1.0
     said = compared(tmp_path, made, rows, names=names).difference or ""
     assert ("they are it backward" in said) == (wrong is None), said
+
+
+OF_A_TOOL = {
+    "pose": ["x", "y", "z", "qw", "qx", "qy", "qz"],
+    "twist": ["vx", "vy", "vz", "wx", "wy", "wz"],
+    "twistd": ["ax", "ay", "az", "ex", "ey", "ez"],
+}
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["t"], "no column of time"),
+        (["q1"], "no column of time"),
+        (["q1", "qd1"], "no column of time"),
+        *((["t", "q1", *names], "the robot has no geometry") for names in OF_A_TOOL.values()),
+        (["t", "q1", "q4"], "the column q4 is none that `plan` writes"),
+        (["t", "q1", "sway"], "the column sway is none that `plan` writes"),
+        (["sway"], "the column sway is none that `plan` writes"),
+    ],
+)
+def test_rows_that_lack_their_time_or_have_more_than_the_plan_are_none_of_it(
+    names: list[str], said: str, plan: Plan, tmp_path: Path
+) -> None:
+    rows = np.stack([rows_at()[:, NAMES.index(name) if name in NAMES else 1] for name in names], axis=1)
+    lines = [",".join(f"{value:.9f}" for value in row) for row in rows.tolist()]
+    (tmp_path / "rows.csv").write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")
+    found = compare_with_plan(ByteSource(str(tmp_path / "rows.csv")), plan)
+    assert not found.planned
+    assert said in (found.difference or "")
+
+
+def as_array(folder: Path, rows: Rows) -> ByteSource:
+    """Return rows as an array with names."""
+    table = np.zeros(len(rows), [(name, "f8") for name in NAMES])
+    for k, name in enumerate(NAMES):
+        table[name] = rows[:, k]
+    np.save(folder / "rows.npy", table)
+    return ByteSource(str(folder / "rows.npy"))
+
+
+@pytest.mark.parametrize("size", [1, 2, 5, 12, 13, 14])
+@pytest.mark.parametrize("rate", [10.0, 1 / 0.15])
+def test_rows_of_the_law_are_known_in_blocks_of_any_size(
+    size: int, rate: float, plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last one may be one row alone; a row that is wrong is told in each."""
+    monkeypatch.setattr(npy, "_ROWS", size)
+    rows = rows_at(rate)
+    assert compare_with_plan(as_array(tmp_path, rows), plan).planned
+    for row in (0, size - 1, size, len(rows) - 1):
+        if row < len(rows):
+            wrong = rows.copy()
+            wrong[row, 3] += 1e-6
+            said = compare_with_plan(as_array(tmp_path, wrong), plan).difference or ""
+            assert f"row {row + 1} has q3" in said
+
+
+@pytest.mark.parametrize("early", [0.0, 1e-5, 1.0])
+@pytest.mark.parametrize("block", [0, 1, 2])
+def test_stamps_that_do_not_increase_are_told_wherever_they_stand(
+    block: int, early: float, plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a block of rows, and from one to the next: these are five rows long."""
+    monkeypatch.setattr(npy, "_ROWS", 5)
+    rows = rows_at(10.0)
+    row = 5 * block or 3
+    rows[row, 0] = rows[row - 1, 0] - early
+    found = compare_with_plan(as_array(tmp_path, rows), plan)
+    assert found.difference == "its time stamps do not increase from row to row"
+
+
+def test_what_changes_its_sign_as_time_goes_back_are_derivatives_of_odd_order() -> None:
+    groups = [group for group in GROUPS if group not in ("tau", "signals")]
+    for column in columns_of(groups, ("revolute", "prismatic"), Units()):
+        order = column.quantity.order if column.quantity is not None else 0
+        assert (column.kind in planned_rows._ODD) == (order % 2 == 1), column.kind
+
+
+@pytest.mark.parametrize(("late", "planned"), [(0.0, True), (1e-3, False), (-1e-3, False)])
+def test_stamps_of_few_digits_beside_full_ones_are_no_rounded_ones(
+    late: float, *, planned: bool, plan: Plan, tmp_path: Path
+) -> None:
+    """Who writes the shortest digits that say a number writes 0.1 for the time of a row, and means it."""
+    rows = rows_at(10.0, late)
+    rows[[0, -1]] = rows_at()[[0, -1]]
+    lines = (",".join(map(repr, row)) for row in rows.tolist())
+    (tmp_path / "rows.csv").write_text("\n".join([",".join(NAMES), *lines]) + "\n", encoding="utf-8")
+    assert compare_with_plan(ByteSource(str(tmp_path / "rows.csv")), plan).planned is planned
+
+
+@pytest.mark.parametrize("missing", [None, 1.0, 0.7])
+@pytest.mark.parametrize("begins", [0.0, 3.0])
+def test_knots_and_all_times_of_the_rate_of_the_job_are_rows_of_it(
+    begins: float, missing: float | None, tmp_path: Path
+) -> None:
+    """A trapezoid of 1 rad/s and 4 rad/s^2 has its knots at 0, 0.25, 1 and 1.25 s; the job says 10 Hz."""
+    fields = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0.0]}, "output": {"rate": 10}}
+    fields |= {"limits": {"velocity": 9, "acceleration": 90, "jerk": None}}
+    move = {"planner": "trapezoid", "to": {"joints": [1.0]}, "velocity": 1.0, "acceleration": 4.0}
+    plan = plan_job(random_jobs.loaded(fields | {"moves": [move]}))
+    t = np.unique(np.round([*np.arange(13) / 10, 0.25, 1.25], 9))
+    t = t[t != missing]
+    past = np.clip(t[:, None] - [0.0, 0.25, 1.0, 1.25], 0.0, None)
+    signs = np.array([1.0, -1.0, -1.0, 1.0])
+    rows = np.stack([begins + t, 2.0 * past**2 @ signs, 4.0 * past @ signs], axis=1)
+    assert compared(tmp_path, plan, rows, names=["t", "q1", "qd1"]).planned is (missing is None)
+
+
+def test_a_plan_that_stands_still_has_one_row(tmp_path: Path) -> None:
+    fields = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0.3]}, "output": {"rate": 10}}
+    fields |= {"limits": {"velocity": 9, "acceleration": 90, "jerk": 900}}
+    move = {"planner": "jerk_limited", "to": {"joints": [0.3]}}
+    plan = plan_job(random_jobs.loaded(fields | {"moves": [move]}))
+    assert plan.trajectory.duration == 0.0
+    for place, planned in ((0.3, True), (0.31, False)):
+        rows = np.array([[0.0, place, 0.0, 0.0]])
+        assert compared(tmp_path, plan, rows, names=["t", "q1", "qd1", "qdd1"]).planned is planned
+
+
+@pytest.mark.parametrize("clock", [0.0, 2.0])
+@pytest.mark.parametrize(
+    ("first", "last", "part"),
+    [
+        (0.0, 0.6, True),
+        (0.3, 0.9, True),
+        (0.65, 1.25, True),
+        (0.0, 1.249, True),
+        (0.001, 1.25, True),
+        (-0.3, 0.3, False),
+    ],
+)
+def test_a_part_of_the_motion_is_told_with_its_place(
+    first: float, last: float, clock: float, tmp_path: Path, *, part: bool
+) -> None:
+    """By a clock that the job says; rows that begin before it does are no part, whatever they show."""
+    fields = {"version": 1, "robot": {"joints": 3}, "start": {"joints": START.tolist()}}
+    fields |= {"limits": {"velocity": 9, "acceleration": 90, "jerk": None}}
+    fields |= {"output": {"rate": 10, "start_time": clock}}
+    move = {"planner": "quintic", "to": {"joints": END.tolist()}, "duration": DURATION}
+    plan = plan_job(random_jobs.loaded(fields | {"moves": [move]}))
+    t = np.linspace(first, last, 8)
+    shown = t - first if first < 0.0 else t
+    rows = np.hstack([clock + t[:, None], states(shown)])
+    said = compared(tmp_path, plan, rows).difference or ""
+    told = f"they are a part of it alone, from {first:.9g} s to {last:.9g} s of 1.25 s"
+    assert (said == told) is part
+    assert part or "part" not in said
+
+
+@pytest.mark.parametrize("row", [1, 4, 8])
+def test_rows_that_are_nearer_than_a_nanosecond_are_no_part(row: int, plan: Plan, tmp_path: Path) -> None:
+    rows = np.insert(rows_at()[:10], row, rows_at()[row], axis=0)
+    rows[row + 1, 0] += 2.0**-31
+    found = compare_with_plan(as_array(tmp_path, rows), plan)
+    assert not found.planned
+    assert "part" not in (found.difference or "")

@@ -15,9 +15,8 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import Column, Group, columns_of, group_of, parse_column
+from trajcli.columns import GROUPS, Column, Group, columns_of, group_of, parse_column
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import Grid, ListedGrid, UniformGrid
 from trajcli.knots import has_knots, knot_grid, knots_of
@@ -147,13 +146,10 @@ def _comparable(
     groups: list[Group] = []
     for column in columns:
         group = group_of(column)
-        if group not in groups:
-            groups.append(group)  # type: ignore[arg-type]
-    try:
-        signals = [signal.name for signal in plan.trajectory.signals]
-        every = columns_of(groups, robot.joint_types, Units(), signals)
-    except InputError:
-        every = ()
+        if group in GROUPS and group not in groups:
+            groups.append(group)
+    signals = [signal.name for signal in plan.trajectory.signals]
+    every = columns_of(groups, robot.joint_types, Units(), signals) if groups else ()
     where = {(column.kind, column.joint): at for at, column in enumerate(every)}
     for column in columns:
         if (column.kind, column.joint) not in where:
