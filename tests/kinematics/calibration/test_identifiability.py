@@ -74,6 +74,25 @@ def test_a_parameter_with_a_little_weight_takes_part(little: float) -> None:
     np.testing.assert_allclose(found[np.argsort(-found[:, 2])], wanted, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("noise", [1e-8, 1e-12, -1e-12])
+def test_what_rounding_leaves_of_a_zero_makes_no_combination(noise: float) -> None:
+    """The last parameter takes no part: the first two are combinations by themselves."""
+    found = _reduced(np.array([[1.0, 0.0, noise], [0.0, 1.0, 0.0]]))
+    np.testing.assert_allclose(found[np.argsort(-found[:, 0])], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], atol=1e-7)
+
+
+@pytest.mark.parametrize("length", [0.05, 1.0, 4.0])
+def test_a_combination_is_the_same_whatever_length_counts_like_an_angle(length: float) -> None:
+    """What 1 m does 2 rad undo: of both together the root of the squares is 1."""
+    parameters = parse_parameters(arm("ur", "standard"), "j1.theta,j1.d")
+    found = identifiability(np.array([[1.0, 2.0], [-0.5, -1.0]]), parameters, length)
+    ((first, second),) = found.combinations
+    assert found.rank == 1
+    assert (first.weight, second.weight) == pytest.approx((2 / 5**0.5, -1 / 5**0.5))
+    gain = np.array([[1.0, 2.0]]) @ found.basis
+    assert abs(gain[0, 0]) > 0.1 * np.abs(found.basis).max()
+
+
 @pytest.mark.parametrize("size", [1e-6, 1e9])
 def test_the_weight_of_all_measurements_has_no_say_in_what_they_determine(size: float) -> None:
     """Column 2 is the sum of the first two, and column 3 does nothing."""
