@@ -72,9 +72,11 @@ def test_a_joint_that_rounding_alone_moves_has_no_acceleration_by_it(joint, slop
 def test_rows_at_a_corner_are_those_of_its_side(side):
     path = polyline([[0.0], [1.0], [-1.0]])
     corner = path.breaks[1:2]
-    rows = JointConstraint(path, np.array([[-0.5, 2.0]]), np.array([[-9.0, 9.0]])).rows(corner, side)
+    constraint = JointConstraint(path, np.array([[-0.5, 2.0]]), np.array([[-9.0, 9.0]]))
+    rows = constraint.rows(corner, side)
     slope = path.evaluate(corner, 1, side=side)[0, 0]
     assert rows.cap[0] ** 0.5 * abs(slope) == pytest.approx(2.0 if side == "left" else 0.5)
+    assert constraint.largest(corner, side).tolist() == rows.cap.tolist()
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -87,6 +89,21 @@ def test_caps_of_approaches_at_a_corner_are_those_of_its_side(side):
     slope = abs(path.evaluate(corner, 1, side=side)[0, 0])
     wanted = (2 * 4.0 * (0.5 if side == "left" else 3.0)) ** 0.5
     assert rows.cap[0] ** 0.5 * slope == pytest.approx(wanted, rel=1e-6)
+    assert ApproachConstraint(path, limits).largest(corner, side).tolist() == rows.cap.tolist()
+
+
+def test_no_motion_is_faster_than_the_shortest_times():
+    """One along the path at nearly any speed keeps limits that are wide enough."""
+    path, velocity, acceleration = joints(0)
+    limits = ApproachLimits(np.tile([-9.0, 9.0], (3, 1)), np.full(3, 1e12), np.zeros(3))
+    for constraint in (
+        JointConstraint(path, 1e6 * velocity, 1e12 * acceleration),
+        ApproachConstraint(path, limits),
+    ):
+        law = law_pieces(S, np.full(S.size, 1e6))
+        assert constraint.excess(law).max() < 1.0
+        assert (constraint.shortest(S) <= law.durations).all()
+        assert constraint.shortest(S).shape == (S.size - 1,)
 
 
 def test_wrong_bounds_are_refused():
@@ -281,3 +298,33 @@ def test_rest_up_to_rounding_is_rest_at_either_end_of_a_path_in_either_direction
     falling = np.array([[[-0.5]], [[1.0 + 1e-17]], [[0.0]]])
     path = PiecewisePolynomial(np.array([0.0, 1.0]), sign * (falling if at_end else rising))
     assert is_at_rest(path) == (not at_end, at_end)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_rate_is_none_beside_the_largest_at_either_end_of_a_piece(backwards):
+    """From 1 to 1e-10 in one piece, or back: a ten billionth of the largest is rest."""
+    rates = np.array([1e-10, 1.0] if backwards else [1.0, 1e-10])
+    rows = np.array([(rates[1] - rates[0]) / 2, rates[0], 0.0])[:, None, None]
+    assert is_at_rest(PiecewisePolynomial(np.array([0.0, 1.0]), rows)) == (backwards, not backwards)
+
+
+def test_what_is_looked_at_block_by_block_is_the_same_as_at_once(monkeypatch):
+    path, velocity, acceleration = joints(2)
+    limits = ApproachLimits(np.tile([-1.9, 1.7], (3, 1)), np.full(3, 2.0), np.full(3, 0.02))
+    law = a_law(3)
+    for constraint in (JointConstraint(path, velocity, acceleration), ApproachConstraint(path, limits)):
+        at_once = constraint.excess(law)
+        with monkeypatch.context() as patched:
+            patched.setattr("trajcli.curves.time_optimal.time_law._BLOCK", 7)
+            np.testing.assert_allclose(constraint.excess(law), at_once, rtol=1e-12)
+        assert at_once[0, 40:].max() > 0.1
+
+
+def test_where_nothing_may_move_the_excess_is_a_number():
+    """The joint goes on beyond the end of its range, where it may not move at all."""
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([1.0, 0.0])[:, None, None])
+    limits = ApproachLimits(np.array([[-1.0, 0.5]]), np.array([1.0]), np.array([0.0]))
+    excess = ApproachConstraint(path, limits).excess(law_pieces(np.linspace(0, 1, 11), np.ones(11)))[0]
+    assert np.isfinite(excess).all()
+    assert (excess[5:] >= 100.0).all()
+    assert (excess <= 1e3).all()
