@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trajcli.consumers.judgement import judge_by_profile, load_profile
+from trajcli.consumers.judgement import ConsumerJudge, judge_by_profile, load_profile
 from trajcli.consumers.rule_check import Surroundings
 from trajcli.job.robot import load_robot
-from trajcli.judge.consumer import ConsumerJudge
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution

@@ -25,9 +25,10 @@ from trajcli.planners.flying_by.flown_parts import (
     flown_parts,
     zone_motion,
 )
+from trajcli.planners.flying_by.flown_parts import _law_between as law_between
 from trajcli.planners.flying_by.motion_search import POWERS, with_shares
 from trajcli.planners.flying_by.row import row_of
-from trajcli.planners.flying_by.search import begin_search
+from trajcli.planners.flying_by.search import FoundStates, begin_search
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
 from trajcli.planning.plan import plan_job
 
@@ -191,3 +192,123 @@ def test_typical_bounds_of_the_same_part_of_a_course_are_looked_for_once(monkeyp
     monkeypatch.setattr(type(course), "rates", None)
     assert course.typical_bounds(0.0, course.length) is whole
     assert course.typical_bounds(0.0, course.length / 2) is half
+
+
+class EasedError(Exception):
+    """The pace of a course was lowered."""
+
+
+def refusing(index, side, largest):
+    """Return a search of laws that finds none where the acceleration at an end of a course is too large."""
+
+    def found(course, number, stretch, states, tempo):
+        if number == index and abs(states[side, 1]) > largest:
+            return NoLawError("the acceleration is too large", {number: stretch[side]})
+        return law_between(course, number, stretch, states, tempo)
+
+    return found
+
+
+@pytest.mark.parametrize(("index", "side"), [(0, 1), (1, 0)])
+def test_where_a_law_fails_beside_a_border_the_state_there_is_calmed(index, side, monkeypatch):
+    """Nothing else is slower for it, but the zone beside it."""
+    chain, _ = chain_with("lines")
+    free = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    before = motion_search.duration_of(free.fastest(chain))
+    asked = abs(free._motion.states[1 + index, 1])
+    monkeypatch.setattr(looked_for, "_law_between", refusing(index, side, 0.85 * asked))
+    monkeypatch.setattr(motion_search.MotionSearch, "_ease", lambda *given: pytest.fail("eased"))
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    parts = search.fastest(chain)
+    states = search._motion.states
+    assert 0.7 * asked < abs(states[1 + index, 1]) <= 0.85 * asked
+    assert before < motion_search.duration_of(parts) < 1.01 * before
+    for part, row in ((parts[0], states[1]), (parts[2], states[2])):
+        assert part.law is not None
+        ends = part.law.evaluate_orders(np.array([part.law.start, part.law.end]), (1, 2))
+        reached = ends[1 if part is parts[0] else 0, :, 0]
+        assert reached == pytest.approx(row, rel=3e-4)
+
+
+@pytest.mark.parametrize(("index", "side", "largest"), [(0, 0, -1.0), (1, 1, -1.0), (0, 1, 0.0)])
+def test_where_a_calmer_state_is_no_help_the_pace_is_lowered(index, side, largest, monkeypatch):
+    """At the start and at the end of a chain the state is given; nor are states calmed for ever."""
+
+    def eased(search, error, paces, states):
+        asked.append((error.failing, states))
+        raise EasedError
+
+    asked: list = []
+    chain, _ = chain_with("lines")
+    monkeypatch.setattr(looked_for, "_law_between", refusing(index, side, largest))
+    monkeypatch.setattr(motion_search.MotionSearch, "_ease", eased)
+    monkeypatch.setattr(motion_search.MotionSearch, "_pace", lambda search, number: 1.0)
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    with pytest.raises(EasedError):
+        search.fastest(chain)
+    failing, states = asked[0]
+    assert failing == {index: chain.stretch(index)[side]}
+    assert np.array_equal(states, search._near), "the states that were found, not calmed ones"
+
+
+@pytest.mark.parametrize(("part", "node"), [(0.1, 1), (0.9, 2), (None, 1)])
+def test_a_law_fails_at_the_node_that_is_nearer(part, node):
+    chain, _ = chain_with("back")
+    corner = chain.corners[0]
+    courses = (*chain.courses, chain.courses[0])
+    longer = replace(chain, courses=courses, corners=(corner, corner), tempos=(1.0,) * 3)
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    search.chain = longer
+    first, last = longer.stretch(1)
+    assert search._failing(1, None if part is None else first + part * (last - first)) == node
+
+
+def test_the_state_at_the_start_of_a_chain_is_not_calmed(monkeypatch):
+    def found(course, number, stretch, states, tempo):
+        if number == 0 and states[0, 1] > 0.95 * started:
+            return NoLawError("the acceleration is too large", {0: 0.0})
+        return law_between(course, number, stretch, states, tempo)
+
+    def eased(search, error, paces, states):
+        raise EasedError
+
+    chain, started = chain_with("lines")[0], 0.3
+    chain = replace(chain, ends=(np.array([0.02, started]), np.zeros(2)))
+    monkeypatch.setattr(looked_for, "_law_between", found)
+    monkeypatch.setattr(motion_search.MotionSearch, "_ease", eased)
+    monkeypatch.setattr(motion_search.MotionSearch, "_pace", lambda search, number: 1.0)
+    with pytest.raises(EasedError):
+        motion_search.MotionSearch(CourseLaws(), by_order=True).fastest(chain)
+
+
+def test_states_on_both_sides_of_a_zone_are_calmed_together():
+    chain, _ = chain_with("lines")
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    search.fastest(chain)
+    row, states = search._motion.row, search._motion.states
+    both = search._calmed({0, 1}, row, states).states
+    assert both[1:3] == pytest.approx(states[1:3] * [0.99, 0.9], rel=1e-5)
+    one = search._calmed({1}, row, states).states
+    assert one[2] == pytest.approx(states[2] * [0.99, 0.9], rel=1e-5)
+    assert not np.allclose(one[1], states[1], rtol=1e-5)
+
+
+def test_a_calmer_state_that_costs_too_much_is_left(monkeypatch):
+    chain, _ = chain_with("lines")
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    search.fastest(chain)
+    row, states = search._motion.row, search._motion.states
+    asked = abs(states[1, 1])
+    monkeypatch.setattr(looked_for, "_law_between", refusing(0, 1, 0.95 * asked))
+    found = FoundStates(states, (0.4, 0.2, 0.4))
+    other, parts = search._flown(row, found)
+    assert abs(other.states[1, 1]) == pytest.approx(0.9 * asked, rel=1e-3)
+    assert len(parts) == 3
+    for longer, taken in ((1.04, True), (1.06, False)):
+        calmed = FoundStates(other.states, (0.4 * longer, 0.2 * longer, 0.4 * longer))
+        monkeypatch.setattr(motion_search.MotionSearch, "_calmed", lambda *given, calmed=calmed: calmed)
+        if taken:
+            assert search._flown(row, found)[0] is calmed
+        else:
+            with pytest.raises(NoLawError):
+                search._flown(row, found)

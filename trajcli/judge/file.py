@@ -23,8 +23,8 @@ from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_o
 from trajcli.units import Quantity, Units, amount_text, joint_quantity
 
 if TYPE_CHECKING:
+    from trajcli.consumers.judgement import ConsumerJudge
     from trajcli.job.read import LoadedJob
-    from trajcli.judge.consumer import ConsumerJudge
     from trajcli.judge.recorded_tool import ToolJudge
     from trajcli.judge.rows.planned_rows import RowComparison
     from trajcli.planning.plan import Plan
@@ -467,7 +467,7 @@ def _tool_of(given: _Given) -> Callable[[], ToolJudge] | None:
 def _consumer_of(profile: str | None, given: _Given) -> Callable[[], ConsumerJudge] | None:
     if profile is None:
         return None
-    from trajcli.judge.consumer import ConsumerJudge
+    from trajcli.consumers.judgement import ConsumerJudge
 
     start: Array | None = None if given.plan is None else given.plan.trajectory.start.position
     return lambda: ConsumerJudge(profile, given.robot, start)

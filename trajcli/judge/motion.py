@@ -25,7 +25,7 @@ from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State
 
 if TYPE_CHECKING:
-    from trajcli.judge.consumer import ConsumerJudge
+    from trajcli.consumers.judgement import ConsumerJudge
     from trajcli.judge.recorded_tool import ToolJudge
 
 JUDGED_ROWS = 16384

@@ -37,6 +37,9 @@ _MOST = 16  # searches
 _LOWERINGS = 8  # of zones, before laws are looked for
 _MORE = 1e-6  # by which a pace is lowered beyond what is needed
 _SLOWER = 0.95  # the pace of a course that has no law between the states that were found
+_CALMINGS = 3  # of states at borders near which there is no law
+_CALM = (0.99, 0.9)  # times speed and acceleration
+_LONGER = 1.05  # times the duration: what costs more is no help
 _EASINGS = 4  # of a course, before states at its borders are those of slower laws
 _EASED = 0.985  # of the pace of a bent course: states on its limits leave a law no room
 _TRIES, _FASTER, _STEEPER = 6, 1.01, 1.06  # bolder states: times their speeds, times their accelerations
@@ -110,8 +113,7 @@ class MotionSearch:
                     continue
                 break
             try:
-                known = self._stopping.parts(self.chain)
-                parts = flown_parts(self.chain, row, found.states, self._laws, known)
+                found, parts = self._flown(row, found)
             except NoLawError as error:
                 if best is not None:
                     break
@@ -129,6 +131,46 @@ class MotionSearch:
         self.chain = self._motion.chain  # a later search may have lowered zones more
         self.model = min(self.model, duration_of(best) - self._motion.lowering)
         return best
+
+    def _flown(self, row: ChainRow, found: FoundStates) -> tuple[FoundStates, list[FlownPart]]:
+        """Return the parts of a motion, and its states: those at borders near which laws fail are calmed.
+
+        Raises:
+            NoLawError: With the states that were found, when that is no help.
+            PlanningError: When some zone has no motion.
+        """
+        known, failed, longest = (
+            self._stopping.parts(self.chain),
+            list[NoLawError](),
+            _LONGER * found.duration,
+        )
+        while True:
+            try:
+                return found, flown_parts(self.chain, row, found.states, self._laws, known)
+            except NoLawError as error:
+                failed.append(error)
+            calm = {self._failing(index, s) for index, s in failed[-1].failing.items()}
+            found = self._calmed(calm, row, found.states)
+            if len(failed) > _CALMINGS or found.duration > longest:
+                raise failed[0]
+
+    def _failing(self, index: int, s: float | None) -> int:
+        """Return the node at the end of a course that is nearer to where its law fails."""
+        first, last = self.chain.stretch(index)
+        return 2 * index - (s is None or s - first <= last - s)
+
+    def _calmed(self, calm: set[int], row: ChainRow, states: Array) -> FoundStates:
+        """Return states with less acceleration and speed at some nodes; on the other side of zones new ones.
+
+        Those at the start and at the end of the chain stay as they are.
+        """
+        states = states.copy()
+        states[[node + 1 for node in calm]] *= _CALM
+        free = {node ^ 1 for node in calm} - calm
+        nodes = [
+            node if k in free else replace(node, given=states[k + 1]) for k, node in enumerate(row.nodes)
+        ]
+        return begin_search(nodes, row.parts, self.chain.ends, states).until().found()
 
     def _leaves_zones(self, parts: Sequence[FlownPart]) -> bool:
         """Return whether zones of a motion have to change: what is better now is not so then."""
