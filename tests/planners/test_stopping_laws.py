@@ -299,13 +299,19 @@ def test_a_calmer_state_that_costs_too_much_is_left(monkeypatch):
     search.fastest(chain)
     row, states = search._motion.row, search._motion.states
     asked = abs(states[1, 1])
+    search._laws = CourseLaws()  # which has no laws yet
     monkeypatch.setattr(looked_for, "_law_between", refusing(0, 1, 0.95 * asked))
-    found = FoundStates(states, (0.4, 0.2, 0.4))
+    found = begin_search(
+        [replace(node, given=state) for node, state in zip(row.nodes, states[1:-1], strict=True)],
+        row.parts,
+        chain.ends,
+        states,
+    ).found()
     other, parts = search._flown(row, found)
     assert abs(other.states[1, 1]) == pytest.approx(0.9 * asked, rel=1e-3)
     assert len(parts) == 3
     for longer, taken in ((1.04, True), (1.06, False)):
-        calmed = FoundStates(other.states, (0.4 * longer, 0.2 * longer, 0.4 * longer))
+        calmed = FoundStates(other.states, tuple(longer * duration for duration in found.durations))
         monkeypatch.setattr(motion_search.MotionSearch, "_calmed", lambda *given, calmed=calmed: calmed)
         if taken:
             assert search._flown(row, found)[0] is calmed

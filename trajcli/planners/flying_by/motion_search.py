@@ -139,11 +139,8 @@ class MotionSearch:
             NoLawError: With the states that were found, when that is no help.
             PlanningError: When some zone has no motion.
         """
-        known, failed, longest = (
-            self._stopping.parts(self.chain),
-            list[NoLawError](),
-            _LONGER * found.duration,
-        )
+        known, failed = self._stopping.parts(self.chain), list[NoLawError]()
+        longest = _LONGER * found.duration
         while True:
             try:
                 return found, flown_parts(self.chain, row, found.states, self._laws, known)
