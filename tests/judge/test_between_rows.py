@@ -321,6 +321,7 @@ def test_forces_of_other_joints_say_nothing_about_this_one(side: int) -> None:
     both = [np.concatenate([10 * rows, rows], axis=1) for rows in (alone.q, alone.qd, alone.qdd)]
     (found,) = over(motion_of(*both, t=alone.t), slides(side, MASS * (PEAK - OVER), joints=2))
     assert (found.joint, found.severity) == ("s1", "warning")
+    assert found.value == pytest.approx(side * MASS * PEAK, rel=1e-5)
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -461,3 +462,18 @@ def test_friction_is_that_of_velocities_where_rows_have_no_accelerations(
     assert (found.kind, found.severity) == ("effort", "error")
     assert found.value == pytest.approx(side * 3.0, rel=1e-6)
     assert over(motion, rubbing(side, 3.1, friction)) == []
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("length", [0.25, 4.0])
+def test_a_force_in_a_later_move_has_its_own_time(length: float, side: int) -> None:
+    """After a second of rest steadily more, to 2 kg times 1.5 m/s^2 at the last row, which alone is over 2.5 N."""
+    t = np.array([0.0, 1.0, 2.0, 2.0 + length])
+    last = np.array([0.25 * length**2, 0.75 * length, 1.5])  # of an acceleration that grows evenly from none
+    q, qd, qdd = (np.array([[0.0], [0.0], [0.0], [side * value]]) for value in last)
+    robots = dict(enumerate([slides(side, 9.0), slides(side, 2.5)]))
+    required = Requirements(robots[0], by_move=robots)
+    judgement = judge_motion(lambda: [motion_of(q, qd, qdd, t=t, moves=[0, 0, 1, 1])], required)
+    (found,) = [each for each in judgement.findings if each.rule == "limit"]
+    assert (found.kind, found.move, found.row) == ("effort", 1, 4)
+    assert [found.value, found.time] == pytest.approx([side * 3.0, t[-1]], rel=1e-6)

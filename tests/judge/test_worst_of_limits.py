@@ -11,7 +11,7 @@ from recorded_rows import bare_robot
 from trajcli.findings import Finding
 from trajcli.judge import joint_limits
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import Limits, unlimited
+from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 SIDES = [1, -1]
@@ -90,10 +90,135 @@ def test_of_many_pieces_that_leave_a_limit_in_between_the_worst_is_found_whereve
 ) -> None:
     """From rest to rest the largest velocity of a cubic is 3/2 of its mean: more than are looked at together."""
     monkeypatch.setattr(joint_limits, "_MANY", 4)
-    ways = np.full(12, 1.0)
-    ways[worst] = 1.2
-    motion = motion_of(side * np.append(0.0, np.cumsum(ways)), np.zeros(13), t=np.arange(13.0))
+    lengths, means = np.tile([1.0, 0.25, 2.0], 4), np.full(12, 1.0)
+    means[worst] = 1.2
+    t, q = (np.append(0.0, np.cumsum(steps)) for steps in (lengths, means * lengths))
+    motion = motion_of(side * q, np.zeros(13), t=t)
     (found,) = over(motion, bounded("velocity", *sorted([side * 1.4, -side * 9.0])), "cubic")
     assert found.count == 12
     assert found.value == pytest.approx(side * 1.8, rel=1e-9)
-    assert found.time == pytest.approx(worst + 0.5, abs=1e-9)
+    assert found.time == pytest.approx((t[worst] + t[worst + 1]) / 2, abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-7, 1.0, 1e7])
+@pytest.mark.parametrize("side", SIDES)
+def test_what_is_over_a_limit_is_so_in_any_unit(side: int, size: float) -> None:
+    """From rest to rest by 3/2 of the mean velocity: a ten thousandth over its limit, or below it."""
+    t, q = np.arange(3.0), side * size * np.array([0.0, 1.0, 1.0])
+    for share, count in ((1 + 1e-4, 1), (1 - 1e-4, 0)):
+        limits = bounded("velocity", *sorted([side * size * 1.5 / share, -side * size * 9.0]))
+        assert len(over(motion_of(q, np.zeros(3), t=t), limits, "cubic")) == count
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("slow", [0, 1])
+def test_pieces_of_each_move_have_their_own_lengths_and_limits(slow: int, side: int) -> None:
+    """From rest to rest by 1 in 1 s, and after 0.5 s of rest in 0.25 s and in 2 s: with 1.5, 6 and 0.75."""
+    t, q = np.array([0.0, 1.0, 1.5, 1.75, 3.75]), np.array([0.0, 1.0, 1.0, 2.0, 3.0])
+    motion = replace(motion_of(side * q, np.zeros(5), t=t), move=np.array([0, 0, 1, 1, 1]))
+    robots = [bare_robot(bounded("velocity", *sorted([side * most, -side * 99.0]))) for most in (1.501, 6.01)]
+    tight = [bare_robot(bounded("velocity", *sorted([side * most, -side * 99.0]))) for most in (1.49, 5.99)]
+    for chosen, count in ((robots, 0), ([*robots[:slow], tight[slow], *robots[slow + 1 :]], 1)):
+        required = Requirements(chosen[0], by_move=dict(enumerate(chosen)), interpolate="cubic")
+        found = [each for each in judge_motion(lambda: [motion], required).findings if each.rule == "limit"]
+        assert len(found) == count
+        for each in found:
+            assert (each.move, each.count) == (slow, 1)
+            assert each.value == pytest.approx(side * (1.5, 6.0)[slow])
+            assert each.time == pytest.approx((0.5, 1.625)[slow])
+
+
+def approached(side: int, most: float) -> Limits:
+    """Return a limit of the velocity towards an end of the range that is so far that it is the same everywhere."""
+    far = 1e6
+    position = np.array([sorted([side * far, -side * 1e4 * far])])
+    by_position = np.array([[most**2 / (2 * far), 0.0]])
+    return replace(unlimited(1), position=position, velocity_by_position=by_position)
+
+
+@pytest.mark.parametrize("by_position", [False, True])
+@pytest.mark.parametrize("length", [0.25, 4.0])
+@pytest.mark.parametrize("side", SIDES)
+def test_a_piece_of_a_later_move_ends_after_its_own_time(length: float, side: int, by_position: bool) -> None:
+    """After a second of rest steadily faster, to 1.5 at the last row, which alone is over its limit of 1.25."""
+    t = np.array([0.0, 1.0, 2.0, 2.0 + length])
+    q, qd = np.array([0.0, 0.0, 0.0, 0.75 * length]), np.array([0.0, 0.0, 0.0, 1.5])
+    motion = replace(motion_of(side * q, side * qd, t=t), move=np.array([0, 0, 1, 1]))
+    limits = [
+        approached(side, most) if by_position else bounded("velocity", *sorted([side * most, -side * 99.0]))
+        for most in (9.0, 1.25)
+    ]
+    robots = [bare_robot(each) for each in limits]
+    required = Requirements(robots[0], by_move=dict(enumerate(robots)), interpolate="cubic")
+    (found,) = [each for each in judge_motion(lambda: [motion], required).findings if each.rule == "limit"]
+    assert found.kind == ("velocity_by_position" if by_position else "velocity")
+    assert (found.value, found.time, found.row) == (pytest.approx(side * 1.5), pytest.approx(t[-1]), 4)
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("columns", [1, 2, 3])
+def test_speeds_are_as_uncertain_beside_a_limit_by_position_as_beside_any_other(
+    columns: int, side: int
+) -> None:
+    """The limit is the same everywhere, and no less certain where the joint is."""
+    t = np.arange(3.0)
+    rows = [side * np.array([0.0, 1.0, 2.0]), side * np.ones(3), np.zeros(3)][:columns]
+    motion = motion_of(*rows, t=t, rounding=0.01)
+    interpolate = ("linear", "cubic", "quintic")[columns - 1]
+    limits = approached(side, 0.9), bounded("velocity", *sorted([side * 0.9, -side * 99.0]))
+    (approach,), (speed,) = (over(motion, each, interpolate) for each in limits)
+    assert (approach.kind, speed.kind) == ("velocity_by_position", "velocity")
+    assert approach.rounding == pytest.approx(speed.rounding, rel=1e-5)
+    assert approach.certainty == speed.certainty == "exceeded"
+
+
+MASS = 2.0
+
+
+def slides(side: int, most: float) -> Robot:
+    """Return two slides at right angles, each of 2 kg; the force of the second one has a limit."""
+    link = LinkInertia(MASS, (0.0, 0.0, 0.0), (0.0,) * 6)
+    joints = tuple(Joint(f"s{k}", "prismatic", alpha=k * np.pi / 2, link=link) for k in range(2))
+    effort = np.array([[-np.inf, np.inf], sorted([side * most, -side * 99.0])])
+    limits = replace(unlimited(2), effort=effort)
+    return Robot("slides", joints, limits, "modified", np.eye(4), np.eye(4), gravity=np.zeros(3))
+
+
+def steps(t: np.ndarray, q: np.ndarray, rounding: tuple[float, float] = (0.0, 0.0)) -> RecordedMotion:
+    """Return rows at rest of two joints, whose accelerations are rounded."""
+    exact, still = np.zeros(2), np.zeros((t.size, 2))
+    resolution = Resolution(0.0, exact, exact, np.array(rounding))
+    return RecordedMotion(
+        t, np.stack([still[:, 0], q], axis=1), still, still, None, None, None, None, resolution, "rows"
+    )
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_a_force_is_as_uncertain_as_the_accelerations_of_the_joints_that_make_it(side: int) -> None:
+    """The other slide moves at a right angle to it: what its accelerations are off by is none of this force."""
+    t, q = np.array([0.0, 1.0]), side * np.array([0.0, 1.0])
+    told = []
+    for rounding in ((0.0, 0.1), (0.2, 0.1), (0.1, 0.0)):
+        required = Requirements(slides(side, 2.0))
+        judgement = judge_motion(lambda rounding=rounding: [steps(t, q, rounding)], required)
+        (found,) = [each for each in judgement.findings if each.rule == "limit"]
+        assert (found.kind, found.joint) == ("effort", "s1")
+        assert found.value == pytest.approx(side * MASS * 10 / 3**0.5, rel=1e-5)
+        told.append(found.rounding)
+    assert told[0] == told[1] > MASS * 0.1
+    assert told[2] < 1e-9
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("dense_first", [False, True])
+def test_rows_are_dense_or_not_where_the_force_is(dense_first: bool, side: int) -> None:
+    """From rest to rest in 1 s or in 5 ms, beside rest in the other one: all rows state a force of none."""
+    lengths = [0.005, 1.0]
+    t = np.array([0.0, *np.cumsum(lengths if dense_first else lengths[::-1])])
+    for fast in (0, 1):
+        length = t[fast + 1] - t[fast]
+        q = side * length**2 * (np.arange(3) > fast)
+        judgement = judge_motion(lambda q=q: [steps(t, q)], Requirements(slides(side, 2.0)))
+        (found,) = [each for each in judgement.findings if each.kind == "effort"]
+        assert found.severity == ("error" if length > 0.01 else "warning")
+        assert found.row == fast + 1
