@@ -227,7 +227,9 @@ def test_the_coarsest_joint_is_named(joint: int) -> None:
     half[joint] = 0.5e-6
     coarse = replace(FRANKA, resolution=replace(FRANKA.resolution, q=half))
     found = judged(coarse, "franka-fr3", Surroundings(coarse.joints, STILL[0])).findings
-    assert [each.joint for each in found if each.rule == "fr3-decimals"] == [f"joint_{joint + 1}"]
+    (told,) = [each for each in found if each.rule == "fr3-decimals"]
+    assert told.joint == f"joint_{joint + 1}"
+    assert "positions are rounded to 1e-06," in told.message
 
 
 @pytest.mark.parametrize("profile", profile_names())

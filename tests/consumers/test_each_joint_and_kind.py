@@ -98,6 +98,10 @@ def test_a_joint_that_rests_in_its_dead_zone_is_no_fault(side: float) -> None:
     q = STILL.copy()
     q[:, 0] = side * (2.7501 - 1e-3)
     assert found(replace(FRANKA, q=q), "franka-fr3", "fr3-velocity-by-position") == []
+    q[1::2, 0] = np.nextafter(q[1::2, 0], side * 9.0)  # what rounding makes of a number is no motion
+    assert found(replace(FRANKA, q=q), "franka-fr3", "fr3-velocity-by-position") == []
+    q[1::2, 0] += side * 2e-14
+    assert found(replace(FRANKA, q=q), "franka-fr3", "fr3-velocity-by-position") != []
 
 
 @SIDES
@@ -234,7 +238,7 @@ def test_stamps_are_counted_in_whole_nanoseconds_and_not_their_differences(
 
 
 @SIDES
-@pytest.mark.parametrize(("beyond", "broken"), [(0.0, False), (1e-7, True)])
+@pytest.mark.parametrize(("beyond", "broken"), [(0.0, False), (5e-9, True)])
 def test_a_torque_just_at_its_limit_is_no_fault(beyond: float, broken: bool, side: float) -> None:
     tau = np.zeros((21, 7))
     tau[:, 4] = side * 12.0 * (1 + beyond)

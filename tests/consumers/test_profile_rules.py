@@ -110,12 +110,18 @@ def test_of_segments_that_become_zero_the_shortest_is_named(shortest: int) -> No
     assert breach.value == pytest.approx(1e-7, abs=1e-12)
 
 
-@pytest.mark.parametrize("named", [None, ("a", "b")])
-def test_joints_that_nobody_names_are_numbered(named: tuple[str, ...] | None) -> None:
+@pytest.mark.parametrize(
+    ("named", "name"),
+    [(None, "q5"), (("a", "b"), "q5"), (tuple("abcdefg"), "e")],
+    ids=["none", "two", "seven"],
+)
+def test_joints_that_the_file_does_not_name_have_the_names_of_the_robot_or_numbers(
+    named: tuple[str, ...] | None, name: str
+) -> None:
     """Names of a robot that has other joints are none of these."""
     rows = replace(with_value(CLEAN["franka-fr3"], "q", 500, 4, 1e-3), joints=None)
     found = judged(rows, "franka-fr3", Surroundings(named, HOME[7])).findings
-    assert {each.joint for each in found if each.rule == "fr3-acceleration"} == {"q5"}
+    assert {each.joint for each in found if each.rule == "fr3-acceleration"} == {name}
 
 
 def test_a_first_point_at_time_zero_is_no_zero_duration() -> None:
@@ -234,6 +240,13 @@ def test_a_point_without_a_number(name: str, missing: float) -> None:
         5,
         "error",
     )
+
+
+def test_the_time_of_a_row_is_told_to_the_nanosecond_of_a_short_file() -> None:
+    rows = CLEAN["ros-jtc"]
+    moving = with_value(replace(rows, t=rows.t + 0.123456789), "qd", -1, 3, -1.3e-7)
+    (told,) = [each for each in judged(moving, "ros-jtc").findings if each.rule == "jtc-last-velocity"]
+    assert " at t = 2.12345679 s (row 21);" in told.message
 
 
 def test_a_last_velocity_above_the_epsilon_of_float32() -> None:

@@ -110,6 +110,8 @@ def test_a_doubled_time_is_a_finding() -> None:
         ({"q": Q.astype(str)}, "expected an array of numbers"),
         ({"qd": QD > 0}, "qd: expected an array of numbers"),
         ({"times": T[:, None]}, r"times: expected shape \(N,\)"),
+        ({"q": np.zeros((50, 0)), "robot": None}, r"q: expected shape \(N, n\)"),
+        ({"q": 1.0, "robot": None}, r"q: expected shape \(N, n\)"),
         ({"robot": "pandaa"}, "no robot"),
         ({"limits": {"velocty": 1}}, "velocty"),
         ({"limits": 3}, "expected a mapping"),
