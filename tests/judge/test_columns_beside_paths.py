@@ -36,6 +36,7 @@ def judged(
     moves: np.ndarray,
     tolerance: Tolerance | None = None,
     paths: dict[int, ToolMotion | None] | None = None,
+    halves: np.ndarray | None = None,
 ) -> list[Finding]:
     """Return what columns beside joints are found to be wrong, in blocks of a hundred rows."""
     nothing = np.zeros(q.shape[1])
@@ -53,7 +54,8 @@ def judged(
         for low in range(0, len(q), SIZE)
     ]
     columns = tuple(parse_column(name) for name in names.split())
-    table = ToolTable(columns, np.zeros(len(columns)), lambda: blocks_of_size([values], SIZE))
+    of_columns = np.zeros(len(columns)) if halves is None else halves
+    table = ToolTable(columns, of_columns, lambda: blocks_of_size([values], SIZE))
     of_plan = plan().moves[0].planned.tool
     if tolerance is not None:
         driven_along = dict.fromkeys(range(3), replace(of_plan, tolerance=tolerance))
@@ -100,12 +102,13 @@ def test_a_tool_is_beside_its_path_by_more_than_that_promises_of_distances(posit
         assert [each.value for each in found] == [pytest.approx(abs(off), rel=1e-2)] * len(found)
 
 
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("wrong", [None, 0, 1, 2])
-def test_each_move_has_a_law_of_its_own(wrong: int | None) -> None:
-    """A distance begins anew in each move; a rate that is too large by a tenth is found in its own."""
+def test_each_move_has_a_law_of_its_own(wrong: int | None, order: int) -> None:
+    """A distance begins anew in each move; a rate, or its rate, that is too large by a tenth is found in its own."""
     q, s = driven(3)
     if wrong is not None:
-        s[wrong * COUNT : (wrong + 1) * COUNT, 1] *= 1.1
+        s[wrong * COUNT : (wrong + 1) * COUNT, order] *= 1.1
     found = along(q, s, Tolerance())
     assert {(each.kind, each.move) for each in found} == (
         {("derivative", wrong)} if wrong is not None else set()
@@ -129,6 +132,49 @@ def test_a_row_that_only_begins_to_stand_at_the_border_of_a_zone_is_on_its_path(
     found = judged(arms, q, "s sd sdd", s, np.zeros(COUNT, dtype=int), paths={0: path})
     turned = [(each.row, each.value) for each in found if each.quantity == "orientation"]
     assert turned == ([(row + 1, pytest.approx(5e-4, rel=1e-2))] if on_path else [])
+
+
+@pytest.mark.parametrize("share", [0.9, -0.9, 1.1, -1.1, 2.0, -2.0])
+def test_a_distance_that_stands_in_a_zone_is_that_of_its_border(share: float) -> None:
+    """As near as the path promises to be to its places."""
+    q, s = driven(1)
+    of_plan, row, near = plan().moves[0].planned.tool, 150, 1e-3
+    until = PiecewisePolynomial(
+        of_plan.law.breaks, of_plan.law.coefficients * (s[row, 0] / of_plan.path.length)
+    )
+    s[row] = s[row, 0] + share * near, 0.0, 0.0
+    arms = ArmsOfMoves(plan().moves[0].robot, [])
+    path = replace(of_plan, law=until, tolerance=Tolerance(near, 1e-3))
+    found = judged(arms, q, "s sd sdd", s, np.zeros(COUNT, dtype=int), paths={0: path})
+    told = [(each.row, each.value) for each in found if each.quantity == "position" and each.kind == "tool"]
+    assert told == ([(row + 1, pytest.approx(abs(share) * near, rel=1e-6))] if abs(share) > 1 else [])
+
+
+@pytest.mark.parametrize("off", [0.0, 2e-3, -2e-3])
+def test_decimals_of_the_second_derivative_of_a_distance_say_nothing_of_the_first(off: float) -> None:
+    """One is known to 0.05 m/s^2, the other one exactly."""
+    q, s = driven(1)
+    s[:, 2] += 0.04 * np.cos(np.arange(COUNT))
+    s[:, 1] += off
+    arms = ArmsOfMoves(plan().moves[0].robot, [])
+    path = replace(plan().moves[0].planned.tool, tolerance=Tolerance(1e-3, 1e-3))
+    moves, halves = np.zeros(COUNT, dtype=int), np.array([0.0, 0.0, 0.05])
+    found = judged(arms, q, "s sd sdd", s, moves, paths={0: path}, halves=halves)
+    assert ("derivative" in {each.kind for each in found}) is (off != 0.0)
+
+
+@pytest.mark.parametrize("cut", [0, 1])
+@pytest.mark.parametrize("row", [30, 90])
+def test_a_path_whose_corners_are_cut_says_nothing_of_another_move(row: int, cut: int) -> None:
+    """Of two moves in the same rows the distances of one are judged alone."""
+    q, s = driven(2)
+    s[[COUNT - row, COUNT + row], 0] += 5e-3
+    path = replace(plan().moves[0].planned.tool, tolerance=Tolerance(1e-4, 1e-4))
+    paths = {cut: replace(path, overlaps=True), 1 - cut: path}
+    arms = ArmsOfMoves(plan().moves[0].robot, [])
+    found = judged(arms, q, "s sd sdd", s, np.repeat([0, 1], COUNT), paths=paths)
+    told = [(each.move, each.row) for each in found if each.quantity == "position" and each.kind == "tool"]
+    assert told == [(0, COUNT - row + 1) if cut else (1, COUNT + row + 1)]
 
 
 @pytest.mark.parametrize("off", [0.0, 2e-9, -2e-9])

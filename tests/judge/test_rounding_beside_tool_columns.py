@@ -167,3 +167,23 @@ def test_the_row_that_rounding_explains_least_is_named(order: int) -> None:
     (found,) = findings(1.0, values, (OFF, 0.0, 0.0))
     assert (found.row, found.count) == (slow + 1, 2)
     assert found.value == pytest.approx(10.0 * (found.limit or 0.0), rel=1e-6)
+
+
+@SIDES
+@pytest.mark.parametrize("name", ["vx", "vy", "wz"])
+def test_rounding_of_positions_explains_no_velocity_that_is_off_by_three_times_as_much(
+    name: str, side: float
+) -> None:
+    """Rows 5 ms apart: both joints are off by 0.5e-4, which makes 0.08 m/s or rad/s at twice their reach of 1 m."""
+    times = np.linspace(0.0, 2.0, 401)
+    kept, at = slice(NAMES.index("vx"), NAMES.index("ax")), NAMES.index(name)
+    resolution = Resolution(0.0, np.full(2, 0.5e-4), np.zeros(2), np.zeros(2))
+    motion = RecordedMotion(times, np.round(states(times)[0], 4), *(None,) * 6, resolution, "rows")
+    for off in (0.0, 0.3):
+        values = true_columns(1.0, times)
+        values[:, at] += side * off
+        table = ToolTable(
+            tuple(parse_column(each) for each in TWIST), np.zeros(6), lambda values=values: [values[:, kept]]
+        )
+        found = judge_tool_columns([motion], table, wheel(1.0), None, wheel(1.0))
+        assert {each.kind for each in found} == ({"derivative"} if off else set())
