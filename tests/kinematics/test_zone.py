@@ -158,6 +158,11 @@ ONE_TERM = {
     "a slide that carries a lever": (arm(SLIDE, LEVER), [[0.0, 0.0], [2.0, 0.1], [0.0, 0.3]]),
     "a short slide on a turning arm": (arm(ACROSS, SLIDE), [[0.0, 0.0], [3.0, 0.2], [0.0, 0.0]]),
     "a slide that travels far and turns": (arm(ACROSS, SLIDE), [[0.0, 0.0], [3.0, 20.0], [0.0, 0.01]]),
+    "a slide at the axis of an arm that turns slowly": (
+        arm(ACROSS, SLIDE),
+        [[0.0, 0.0], [0.01, 4.0], [0.0, 0.0]],
+    ),
+    "a lever that stands upright": (arm(ACROSS, LEVER), [[0.0, 2.0], [0.0, 0.0], [0.0, np.pi / 2]]),
 }
 
 
