@@ -138,4 +138,5 @@ def test_a_change_of_the_branch_is_that_of_its_move() -> None:
     vars(tool)["determinants"] = np.where(np.arange(tool.times.size) < 9, 1.0, -1.0)
     (found,) = check_tool(tool)
     assert (found.kind, found.move, found.method) == ("branch", 4, "sampled")
+    assert (found.value, found.limit) == (0.0, 0.0)
     assert found.time == pytest.approx(BEGINS + 1.0)
