@@ -433,6 +433,7 @@ def test_where_the_tool_does_not_jump_with_a_joint_it_is_the_branch_that_changes
     q[first:] += 1.0
     q[16:] -= 0.7
     tool = _KnownTool()
+    tool.notes.append("what cannot be judged")
     motion = rows(q, np.gradient(1e-4 * np.arange(COUNT), DENSE))
     known: Any = tool
     judged = judge_motion(lambda: [motion], Requirements(bare_robot(unlimited(1)), tool=lambda: known))
@@ -441,3 +442,4 @@ def test_where_the_tool_does_not_jump_with_a_joint_it_is_the_branch_that_changes
     low = max(first - 2, 0)
     assert (q[low : first + 2].tolist(), first - 1 - low) in tool.asked
     assert (q[14:18].tolist(), 1) in tool.asked
+    assert judged.notes == ("what cannot be judged",)

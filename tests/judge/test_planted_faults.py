@@ -430,3 +430,54 @@ def test_lengths_do_not_look_like_degrees(sizes: tuple[float, float]) -> None:
     found = judge_motion(lambda: [motion], Requirements(robot)).findings
     assert {each.kind for each in found} == {"position"}
     assert not [each.hint for each in found if "degrees" in (each.hint or "")]
+
+
+@pytest.mark.parametrize(("turns", "looks"), [(1.95, False), (-1.95, False), (2.05, True), (-2.05, True)])
+def test_only_what_goes_beyond_two_turns_looks_like_degrees(turns: float, looks: bool) -> None:
+    """Joints of wrists turn more than once: a range that they pass is no question of units."""
+    motion = rows_of(quintic(1), 0.01, 1)
+    motion = replace(motion, q=motion.q / DISTANCE * turns * 2.0 * np.pi)
+    wide = limits(joints=1, velocity=1e9, acceleration=1e9, jerk=1e9, position=1.0)
+    found = worst(judged(motion, wide), "position")
+    assert abs(found.value) == pytest.approx(abs(turns) * 2.0 * np.pi)
+    assert ("degrees" in (found.hint or "")) is looks
+
+
+class _Consumer:
+    """Rules with one finding that says itself what fixes it."""
+
+    def take(self, block: RecordedMotion) -> None:
+        del block
+
+    def result(self) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+        fields = {"limit": 1.0, "time": 0.0, "message": "far", "rule": "range"}
+        return (Finding(kind="position", joint="j1", value=1e9, hint="stay in the range", **fields),), ()
+
+
+def test_what_a_finding_says_itself_is_not_taken_for_degrees() -> None:
+    motion = rows_of(quintic(1), 0.01, 1)
+    free = limits(joints=1, **dict.fromkeys(("position", "velocity", "acceleration", "jerk"), 1e9))
+    found = worst(judged(replace(motion, q=np.degrees(motion.q)), free, consumer=_Consumer), "position")
+    assert found.hint == "stay in the range"
+
+
+@pytest.mark.parametrize(("off", "told"), [(0.0, False), (1e-13, False), (1e-7, True)])
+def test_stamps_that_floating_point_rounds_are_as_they_were(off: float, told: bool) -> None:
+    """One of them stands beside its multiple of 10 ms, by some units in the last place or by its rounding to 1 us."""
+    rows = rows_of(quintic(1), 0.01, 1)
+    t = 0.01 * np.arange(len(rows.t))
+    t[50] += off
+    rows = replace(rows, t=t, resolution=Resolution(1e-6, *3 * (np.zeros(1),)))
+    judgement = judged(rows, limits(joints=1))
+    assert judgement.period == pytest.approx(0.01, rel=1e-12)
+    moved = [float(note.split(" by ")[1].split(" s ")[0]) for note in judgement.notes]
+    assert moved == ([pytest.approx(off, rel=0.01)] if told else [])
+
+
+def test_what_is_furthest_beyond_its_limit_is_said_first() -> None:
+    """Whoever says it: the rules of a consumer are asked last, and a warning that the end moves is behind all."""
+    rows = part(rows_of(quintic(1), 0.01, 2), slice(0, 150))
+    free = dict.fromkeys(("position", "acceleration", "jerk"), np.inf)
+    found = judged(rows, limits(joints=1, velocity=0.5 * PEAKS[0], **free), consumer=_Consumer).findings
+    kinds = [(each.kind, each.severity) for each in found]
+    assert kinds == [("position", "error"), ("velocity", "error"), ("end", "warning")]
