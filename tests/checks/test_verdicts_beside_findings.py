@@ -60,6 +60,19 @@ def test_a_path_of_a_tool_that_no_arm_carries_is_not_judged() -> None:
     assert verify(RIGHT.trajectory, [limits(6)], [Promise(tool=RIGHT.motion, robot=RIGHT.robot)]).sampled
 
 
+def test_a_tool_along_a_path_has_no_peaks_of_its_own_and_one_that_joints_move_has() -> None:
+    """Half a metre from the axis it goes half as fast as the joint: 1.875 rad in 2 s at most."""
+    of_tool = replace(RIGHT.robot, limits=replace(limits(6), tcp=ToolLimits(speed=9.0)))
+    promise = Promise(tool=RIGHT.motion, robot=of_tool)
+    verdict = verify(RIGHT.trajectory, [of_tool.limits], [promise])
+    assert verdict.surveys[0]["tool"]
+    assert verdict.tool_peaks == (None,)
+    turned = replace(arm(), limits=OF_THE_TOOL)
+    (peaks,) = verify(trajectory(between([0.0], [1.0])), [OF_THE_TOOL], [Promise(robot=turned)]).tool_peaks
+    assert peaks is not None
+    assert peaks["speed"].value == pytest.approx(0.5 * 1.875 / 2.0, rel=1e-6)
+
+
 def test_each_move_says_what_it_uses_of_its_limits_by_position() -> None:
     """At 0.75 rad the bound is sqrt(2 d x) - o with x = 3 - q; where no such limit is, nothing is used."""
     whole = trajectory(between([0.0], [1.5], duration=1.0), between([1.5], [0.0], duration=9.0))
@@ -157,3 +170,27 @@ def test_no_duration_helps_a_move_that_is_over_its_limit_at_either_end(last: boo
     whole = trajectory(between([0.0], [1.0], duration=0.5))
     hints = advice(whole, limits(velocity=1.0), ends=ends if last else ends[::-1])
     assert "starts or ends over its limit" in hints["velocity"]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_the_joint_that_is_over_its_limit_at_an_end_is_told_so_in_either_direction(
+    joint: int, side: float
+) -> None:
+    """It declares to end at 2 rad/s, where 1 rad/s is allowed, and the other joint stands; or it ends at 0.5 rad/s."""
+    to = side * np.eye(2)[joint]
+    whole = trajectory(between([0.0, 0.0], to.tolist(), duration=0.5))
+    for speed, over in ((2.0, True), (0.5, False)):
+        ends = (state([0.0, 0.0]), replace(state(to.tolist()), velocity=speed * to))
+        hints = advice(whole, limits(2, velocity=1.0), ends=ends)
+        assert ("starts or ends over its limit" in hints["velocity"]) is over
+
+
+@pytest.mark.parametrize(("speed", "over"), [(3.0, True), (-3.0, True), (1.0, False)])
+def test_the_tool_that_is_too_fast_at_an_end_is_told_so(speed: float, over: bool) -> None:
+    """Half a metre from the axis, where 1 m/s is allowed: 2 rad/s of the joint."""
+    of_tool = replace(limits(), tcp=ToolLimits(speed=1.0))
+    whole = trajectory(between([0.0], [1.0], duration=0.3))
+    ends = (state([0.0]), state([1.0], velocity=speed))
+    hints = advice(whole, of_tool, ends=ends, robot=replace(arm(), limits=of_tool))
+    assert ("the tool is too fast where the move starts or ends" in hints["tool_speed"]) is over

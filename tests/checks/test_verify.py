@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from motions import between, limits, state, trajectory
+from test_check_tool import RIGHT
 
 from trajcli.checks.continuity import acceleration_steps, check_continuity
-from trajcli.checks.verify import check_limits, verify
+from trajcli.checks.verify import check_limits, over_limits, verify
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.kinematics.robot import Payload, ToolLimits
+from trajcli.limits.kinds import KIND_OF
 from trajcli.trajectory import Promise, ViaPoints
 
 
@@ -67,6 +69,8 @@ def test_what_nobody_limits_is_said() -> None:
     assert verify(whole, [all_bounded, all_bounded]).unchecked == ()
     expected = (("j1", "velocity"), ("j1", "jerk"), ("j2", "jerk"))
     assert verify(whole, [all_bounded, open_ended]).unchecked == expected
+    mirrored = replace(open_ended, velocity=-one_sided[:, ::-1])  # unlimited downwards
+    assert verify(whole, [all_bounded, mirrored]).unchecked == expected
 
 
 @pytest.mark.parametrize(("loaded", "unchecked"), [((), ()), ((1,), ()), ((2,), (("j1", "effort"),))])
@@ -104,9 +108,73 @@ def test_limits_must_be_as_many_as_moves() -> None:
         verify(trajectory(between([0.0], [1.0])), [])
 
 
+@pytest.mark.parametrize("judge", [verify, over_limits])
+@pytest.mark.parametrize(("bounds", "promises"), [(0, 1), (2, 1), (1, 2)])
+def test_more_limits_or_promises_than_moves_are_refused_like_fewer(
+    judge: Any, bounds: int, promises: int
+) -> None:
+    with pytest.raises(ValueError, match="for 1 moves"):
+        judge(trajectory(between([0.0], [1.0])), [limits()] * bounds, [Promise()] * promises)
+
+
+def test_limits_alone_are_judged_as_in_the_whole_verdict() -> None:
+    """Joints are too fast in the second move, and too fast so near to the end of their range in the first one."""
+    first, second = between([0.0], [1.0], duration=1.0), between([1.0], [0.0], duration=1.0)
+    near = replace(limits(position=1.5), velocity_by_position=np.array([[0.5, 0.0]]))
+    whole = trajectory(first, second, start=state([0.0], velocity=0.1))
+    arguments = whole, [near, limits(velocity=1.0)], [Promise(over_limit="stop"), Promise()]
+    alone = over_limits(*arguments)
+    assert [(each.move, each.kind) for each in alone] == [(0, "velocity_by_position"), (1, "velocity")]
+    assert all("longer" in (each.hint or "") for each in alone)
+    of_all = verify(*arguments).findings
+    assert [each.kind for each in of_all if each.kind not in KIND_OF] == ["velocity_jump"]
+    told = [(each.move, each.kind, each.value, each.time) for each in of_all if each.kind in KIND_OF]
+    assert [(each.move, each.kind, each.value, each.time) for each in alone] == told
+
+
+@pytest.mark.parametrize(("first", "second"), [(2.0, 3.0), (3.0, 2.0)])
+@pytest.mark.parametrize("before", [0.0, 4.0])
+def test_one_duration_is_said_that_is_long_enough_for_all_findings_of_a_move(
+    first: float, second: float, before: float
+) -> None:
+    """From rest to rest by 1 rad in 1 s: 10 / sqrt(3) rad/s^2 on both sides of 1.875 rad/s after 0.5 s."""
+    bounds = limits(velocity=1.875 / second, acceleration=10 / 3**0.5 / first**2)
+    moves = [between([0.0], [1.0], duration=1.0)]
+    moves = [constant([0.0], before), *moves] if before else moves
+    found = verify(trajectory(*moves), [bounds] * len(moves), [Promise()] * len(moves)).findings
+    assert sorted(each.kind for each in found) == ["acceleration", "velocity"]
+    for each in found:
+        times, seconds = (each.hint or "").split(" times longer (")
+        assert float(times.split(" ")[-1]) == pytest.approx(3.0, rel=1e-5)
+        assert float(seconds.split(" ")[0]) == pytest.approx(3.0, rel=1e-5)
+
+
 def test_ten_thousand_pieces_give_one_finding_for_each_move_joint_and_kind() -> None:
     rng = np.random.default_rng(2)
     curve = PiecewisePolynomial(np.arange(10_001) * 0.1, rng.normal(size=(4, 10_000, 6)))
     verdict = verify(trajectory(curve), [limits(6, velocity=1.0)])
     assert {f.kind for f in verdict.findings} == {"velocity", "position_jump", "velocity_jump"}
     assert len(verdict.findings) == 18
+
+
+@pytest.mark.parametrize("limited", [0, 1])
+def test_each_step_in_acceleration_is_legal_or_a_finding_by_the_limits_of_its_move(limited: int) -> None:
+    """Two cubics of 1 rad in 1 s: from 0 to 6 rad/s^2, from -6 to 6 and from -6 to 0; one of them has a limit of jerk."""
+    whole = trajectory(*(between([k], [k + 1.0], duration=1.0, conditions=2) for k in (0.0, 1.0)))
+    verdict = verify(whole, [limits(jerk=99.0) if k == limited else limits() for k in range(2)])
+    found = {each.move for each in verdict.findings if each.kind == "acceleration_jump"}
+    legal = [each.time for each in verdict.steps]
+    assert (found, legal) == ({limited}, [2.0 - 2.0 * limited])  # the step between them breaks a limit, too
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_the_one_move_that_goes_along_a_path_is_told_wherever_it_stands(along: int) -> None:
+    line = RIGHT.trajectory.curve
+    q = (line.piece_ends()[1][-1] if along == 0 else line.piece_ends()[0][0]).tolist()
+    moves = [constant(q, 1.0), constant(q, 1.0)]
+    moves[along] = line
+    promises = [Promise(), Promise()]
+    promises[along] = Promise(tool=RIGHT.motion, robot=RIGHT.robot)
+    verdict = verify(trajectory(*moves), [limits(6)] * 2, promises)
+    assert verdict.sampled
+    assert {moves for _, moves in verdict.sampled} == {(along,)}
