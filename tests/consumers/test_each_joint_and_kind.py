@@ -325,10 +325,30 @@ def test_numbers_of_few_bits_are_as_rough_as_the_largest_of_a_joint(
     """Of single precision and less a share of each position is lost; 25 rad/s^3 are 8 of them over 1e-9 s^3."""
     q = np.zeros((21, 7))
     q[row, 4] = side * 2.0
-    rough = replace(FRANKA.resolution, q=np.zeros(7), relative=share * 25.0 * 1e-9 / 8.0 / 2.0)
+    rough = replace(FRANKA.resolution, q=np.zeros(7), relative=(share * 25.0 * 1e-9 / 8.0 / 2.0,) * 3)
     told = found(replace(FRANKA, q=q, resolution=rough), "franka-fr3", "fr3-decimals")
     assert [each.joint for each in told] == ["joint_5"] * broken
     assert [each.limit for each in told] == [pytest.approx(25.0)] * broken
+
+
+@pytest.mark.parametrize("largest", [0, 1, 2])
+@pytest.mark.parametrize(("share", "broken"), [(0.99, False), (1.01, True)])
+def test_numbers_of_few_bits_are_as_rough_as_the_largest_of_any_block(
+    largest: int, share: float, *, broken: bool
+) -> None:
+    """A long file comes block by block; its largest position may stand in any of them, and is told once."""
+    blocks = []
+    for k in range(3):
+        rough = replace(
+            FRANKA.resolution, q=np.zeros(7), relative=(share * 25.0 * 1e-9 / 8.0 / 2.0, 0.0, 0.0)
+        )
+        q = np.full((21, 7), 2.0 if k == largest else 1.9)
+        blocks.append(replace(FRANKA, q=q, resolution=rough, first_row=1 + 21 * k))
+    every = judge_by_profile(blocks, load_profile("franka-fr3"), Surroundings(FRANKA.joints, q[0])).findings
+    told = [each for each in every if each.rule == "fr3-decimals"]
+    assert [(each.value, each.row, each.count) for each in told] == [
+        (pytest.approx(share * 25.0), 1 + 21 * largest, 1)
+    ] * broken
 
 
 def test_of_joints_that_are_rounded_alike_the_one_with_the_least_jerk_is_named() -> None:

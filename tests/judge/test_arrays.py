@@ -161,7 +161,7 @@ def test_limits_are_those_of_the_call_whatever_numpy_prints_of_them(digits: int)
 def test_single_and_half_precision_explain_half_a_unit_of_their_last_place(
     name: str, kind: str, rounding: float
 ) -> None:
-    """At 1 rad half a unit is 2^-24, or 2^-11. Of times it explains none of the positions, and the other way round.
+    """At 1 rad half a unit is 2^-24, or 2^-11. Of times and rates it explains none of the positions.
 
     Of four arrays one is of fewer bits; whole numbers are not rounded. A position is beyond its limit by half of that
     rounding, or by more.
@@ -177,8 +177,27 @@ def test_single_and_half_precision_explain_half_a_unit_of_their_last_place(
     for share in (0.5, 1.2, 3.0):
         limit = at - share * (rounding or 2.0**-24)
         found = trajcli.check(**arrays, limits={"position": [[-9.0, limit]]})
-        explained = rounding > 0 and name != "times" and share < 1
+        explained = rounding > 0 and name == "q" and share < 1
         assert found.verdict == ("within rounding" if explained else "exceeded"), share
+
+
+@pytest.mark.parametrize(
+    "kinds", [("f8", "f2", "f2"), ("f4", "f4", "f2"), ("f2", "f8", "f8"), ("f2", "f8", "f4")]
+)
+def test_derivatives_differ_by_no_more_than_their_own_bits(kinds: tuple[str, ...]) -> None:
+    """Sine and cosine rounded by numpy; a step of rates is one where these bits make less of it.
+
+    Half a unit is up to 2^-11, so that two make 0.5 of the next derivative within 2 ms.
+    """
+    t = np.arange(0.0, 6.0, 0.002)
+    for wrong, step in ((None, 0.0), ("qd", 2.0), ("qdd", 2.0)):
+        rates = {"q": np.sin(t), "qd": np.cos(t), "qdd": -np.sin(t)}
+        given = {
+            name: (values + step * (name == wrong) * (t > 2.0))[:, None].astype(kind)
+            for (name, values), kind in zip(rates.items(), kinds, strict=True)
+        }
+        found = trajcli.check(t, **given)
+        assert found.verdict == ("satisfied" if wrong is None else "exceeded"), wrong
 
 
 @pytest.mark.parametrize("single", [True, False])
@@ -215,3 +234,17 @@ def test_the_tool_of_an_arm_keeps_its_limits(share: float, verdict: str) -> None
     assert {each.kind for each in found.findings if each.severity == "error"} == (
         {"tool_speed"} if share < 1 else set()
     )
+
+
+@pytest.mark.parametrize("name", ["qd", "qdd"])
+@pytest.mark.parametrize(("kind", "rounding"), [("f2", 2.0**-11), ("f4", 2.0**-24), ("f8", 0.0)])
+def test_few_bits_of_a_rate_explain_none_of_another(name: str, kind: str, rounding: float) -> None:
+    """A joint that reaches 1 rad/s at 1 rad/s^2, in binary numbers of few digits; its end is beyond the limit."""
+    t = np.arange(9.0)[:, None] / 8.0
+    rates = {"qd": t, "qdd": np.ones_like(t)}
+    rates[name] = rates[name].astype(kind)
+    for share in (0.5, 1.2):
+        limit = 1.0 - share * (rounding or 2.0**-24)
+        found = trajcli.check(t[:, 0], t**2 / 2.0, **rates, limits={"velocity": limit})
+        explained = rounding > 0 and name == "qd" and share < 1
+        assert found.verdict == ("within rounding" if explained else "exceeded"), share

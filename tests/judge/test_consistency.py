@@ -346,7 +346,7 @@ def test_values_in_single_precision_are_rounded_by_a_share_of_each(share: float,
     """At 100 rad by 6e-6 in turns, up and down; the rate is zero throughout."""
     q = 100.0 * (1.0 + share * 2.0**-24 * (-1.0) ** np.arange(COUNT))
     motion = rows(q, np.zeros(COUNT))
-    motion = replace(motion, resolution=replace(motion.resolution, relative=2.0**-24))
+    motion = replace(motion, resolution=replace(motion.resolution, relative=(2.0**-24,) * 3))
     assert [each.kind for each in inconsistent(motion)] == (["derivative"] if broken else [])
 
 

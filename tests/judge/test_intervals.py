@@ -32,7 +32,7 @@ def window_of(seed: int, **changes: object) -> Intervals:
         "rows": 10 + np.arange(ROWS),
         "moves": np.zeros(ROWS, dtype=np.int64),
         "interpolation": "cubic",
-        "resolution": Resolution(0.0, *off, relative=1e-5),
+        "resolution": Resolution(0.0, *off, relative=(1e-5,) * 3),
         "first": 0,
         "last": ROWS - 1,
         "ends": True,

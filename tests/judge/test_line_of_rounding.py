@@ -143,7 +143,7 @@ def test_numbers_of_few_digits_are_off_by_a_share_of_the_larger_one(back, plante
     moves = -side if back else side
     limits = one_limit("velocity", moves, (1.0 - planted * 2 * OFF) / length)
     motion = rows(q)
-    motion = replace(motion, resolution=replace(motion.resolution, relative=OFF))
+    motion = replace(motion, resolution=replace(motion.resolution, relative=(OFF,) * 3))
     found = found_in(motion, bare_robot(limits), "velocity", "linear")
     assert (found.certainty, found.severity, found.row) == (certainty, "error", 3)
     assert found.rounding == pytest.approx(2 * OFF / length, rel=1e-6)

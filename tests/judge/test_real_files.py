@@ -105,3 +105,31 @@ def test_five_points_of_a_goal_for_an_arm_of_universal_robots(tmp_path: Path) ->
         if found.kind == "acceleration"
     }
     assert {("elbow_joint", 1, 6.87), ("wrist_3_joint", 4, 5.54)} <= named
+
+
+@pytest.mark.parametrize(
+    "kinds", [("f8", "f2", "f2"), ("f8", "f4", "f2"), ("f4", "f8", "f2"), ("f8", "f2", "f8")]
+)
+@pytest.mark.parametrize("form", ["npy", "npz"])
+def test_rates_of_fewer_bits_than_their_positions_are_no_fault(
+    kinds: tuple[str, ...], form: str, tmp_path: Path
+) -> None:
+    """Sine and cosine rounded by numpy are each other's derivatives; with a step of some half units they are not.
+
+    Half a unit of a velocity is up to 2^-11 rad/s, and two of these make 0.5 rad/s^2 within 2 ms.
+    """
+    t = np.arange(0.0, 6.0, 0.002)
+    (tmp_path / "arm.yaml").write_text("joints: 1\n")
+    for wrong, step in ((None, 0.0), ("qd", 0.01), ("qdd", 2.0)):
+        fields = [("t", "f8"), *zip(("q1", "qd1", "qdd1"), kinds, strict=True)]
+        rows = np.empty(t.size, fields)
+        for (name, _), values in zip(fields, (t, np.sin(t), np.cos(t), -np.sin(t)), strict=True):
+            rows[name] = values + step * (name == f"{wrong}1") * (t > 2.0)
+        file = tmp_path / f"rows.{form}"
+        if form == "npz":
+            np.savez(file, **{name: rows[name] for name, _ in fields})
+        else:
+            np.save(file, rows)
+        found = check_file(str(file), CheckOptions(robot=str(tmp_path / "arm.yaml"), units="rad")).judgement
+        assert found.verdict == ("satisfied" if wrong is None else "exceeded")
+        assert (wrong is None) == (not errors(found))

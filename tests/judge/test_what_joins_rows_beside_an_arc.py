@@ -72,7 +72,7 @@ def deviations(
     origin = forward(robot, np.zeros(3))[:3, 3]
     axes = np.stack([forward(robot, unit)[:3, 3] - origin for unit in np.eye(3)], axis=1)
     half = np.full(3, off[0])
-    resolution = Resolution(0.0, half, half, half, relative=off[1])
+    resolution = Resolution(0.0, half, half, half, relative=(off[1],) * 3)
     qd = None if velocities is None else velocities @ axes
     moves = np.zeros(count, dtype=np.int64)
     rows = RecordedMotion(

@@ -447,7 +447,8 @@ def test_stamps_of_24_hz_lie_on_their_grid():
 
 def test_a_chunk_in_single_precision():
     found = open_motion(FILES / "chunk_float32.npy", units="rad", joints=[f"j{k}" for k in range(7)])
-    assert found.resolution.relative == found.resolution.relative_time == 2.0**-24
+    assert found.resolution.relative == (2.0**-24, 0.0, 0.0)
+    assert found.resolution.relative_time == 2.0**-24
     assert found.resolution.q.tolist() == [0.0] * 7
     assert found.period.period == 0.02
     np.testing.assert_array_equal(found.whole().q, np.load(FILES / "chunk_float32.npy")[:, 1:].astype(float))

@@ -186,20 +186,21 @@ class RoundingNoise(RuleCheck):
 
     parameters: ClassVar[Mapping[str, Any]] = {"period": None, "limit": None, "share": None}
 
-    _seen = False
+    _worst = 0.0
 
     def _take(self, rows: RecordedMotion) -> None:
-        if self._seen or not self.fits("limit", rows.q.shape[1]):
+        if not self.fits("limit", rows.q.shape[1]):
             return
-        self._seen = True
         limit = self.vector("limit", rows.q.shape[1])
         resolution = rows.resolution
-        half = resolution.q + resolution.relative * np.abs(rows.q).max(axis=0)
+        half = resolution.q + resolution.relative[0] * np.abs(rows.q).max(axis=0)
         noise = rounding_noise(3, half, self.number("period"))
         used = noise / limit
         joint = int(used.argmax())
-        if used[joint] <= self.number("share"):
+        if used[joint] <= max(self.number("share"), self._worst):
             return
+        self._worst = float(used[joint])
+        self.forget()
         fields = {
             "kind": "quantisation",
             "value": float(noise[joint]),

@@ -163,13 +163,13 @@ def _check_alike(first: EditedMotion, second: EditedMotion) -> None:
 def _check_states_agree(first: EditedMotion, second: EditedMotion) -> None:
     """Refuse a jump of position or velocity between two motions, beyond the rounding of both."""
     problems = []
-    for name, what in (("q", "position"), ("qd", "velocity")):
+    for order, (name, what) in enumerate((("q", "position"), ("qd", "velocity"))):
         ends = [motion.quantities.get(name) for motion in (first, second)]
         if ends[0] is None or ends[1] is None:
             continue
         before, after = ends[0][-1], ends[1][0]
         resolutions = [getattr(motion.rows.resolution, name) for motion in (first, second)]
-        relative = sum(motion.rows.resolution.relative for motion in (first, second))
+        relative = sum(motion.rows.resolution.relative[order] for motion in (first, second))
         room = 2 * sum(resolutions) + relative * np.abs(after) + _SAME * (1 + np.abs(after))
         problems += [
             _jump(first, second, joint, what, (float(before[joint]), float(after[joint])))

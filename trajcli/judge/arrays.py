@@ -54,7 +54,7 @@ def judge_arrays(
     _check_shapes(t, arrays, joints)
     shares = [0.0 if values is None else share_of(values.dtype) for values in given.values()]
     nothing = np.zeros(joints)
-    resolution = Resolution(0.0, nothing, nothing, nothing, max(shares[1:]), shares[0])
+    resolution = Resolution(0.0, nothing, nothing, nothing, tuple(shares[1:]), shares[0])
     motion = RecordedMotion(
         t, positions, arrays["qd"], arrays["qdd"], None, None, None, None, resolution, "the motion"
     )

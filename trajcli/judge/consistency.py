@@ -98,19 +98,19 @@ class Changes:
 
 def changes_of(window: Intervals) -> list[Changes]:
     """Return how positions, velocities and accelerations change, as far as the rows have them."""
-    q, qd, qdd = window.states
+    states = window.states
     resolution, length, late = window.resolution, window.lengths[:, None], window.late[:, None]
-    rows_and_roundings = [(q, resolution.q), (qd, resolution.qd), (qdd, resolution.qdd)]
+    roundings = list(zip((resolution.q, resolution.qd, resolution.qdd), resolution.relative, strict=True))
     found = []
-    for order, (values, rounding) in enumerate(rows_and_roundings):
+    for order, values in enumerate(states):
         if values is None:
             continue
-        off = stated_errors(values, np.asarray(rounding), resolution.relative)
+        off = stated_errors(values, *roundings[order])
         change, error = np.diff(values, axis=0), off[:-1] + off[1:]
         stated = slack = None
-        rates = rows_and_roundings[order + 1][0] if order < 2 else None
+        rates = states[order + 1] if order < 2 else None
         if rates is not None:
-            off = stated_errors(rates, np.asarray(rows_and_roundings[order + 1][1]), resolution.relative)
+            off = stated_errors(rates, *roundings[order + 1])
             mean = 0.5 * (rates[:-1] + rates[1:])
             stated = length * mean
             turns = np.diff(rates, axis=0) / (length if order == 0 else 1.0)

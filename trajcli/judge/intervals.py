@@ -114,13 +114,15 @@ class Intervals:
         """
         roundings = (self.resolution.q, self.resolution.qd, self.resolution.qdd)
         ends, errors = [], []
-        for values, rounding in zip(self.states[:count], roundings, strict=False):
+        for values, rounding, share in zip(
+            self.states[:count], roundings, self.resolution.relative, strict=False
+        ):
             if values is None:
                 break
             both = np.stack([values[piece, joint], values[piece + 1, joint]])
             absolute = np.broadcast_to(rounding, values.shape[1:])[joint]
             ends.append(both)
-            errors.append(stated_errors(both, absolute, self.resolution.relative).max(axis=0))
+            errors.append(stated_errors(both, absolute, share).max(axis=0))
         spline = self.interpolation == "jtc-upsampling"
         return PieceRows(self.lengths[piece], self.late[piece], tuple(ends), tuple(errors), spline)
 

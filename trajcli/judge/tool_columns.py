@@ -141,8 +141,10 @@ class _Judge:
         poses = self._seen.values(motion.t.size, motion.move, lambda arm, k: forward(arm, motion.q[k]))
         off = motion.resolution
         errors = [
-            stated_errors(rows, rounding, off.relative).sum(axis=1)
-            for rows, rounding in ((motion.q, off.q), (motion.qd, off.qd), (motion.qdd, off.qdd))
+            stated_errors(rows, rounding, share).sum(axis=1)
+            for rows, rounding, share in zip(
+                (motion.q, motion.qd, motion.qdd), (off.q, off.qd, off.qdd), off.relative, strict=True
+            )
             if rows is not None
         ]
         if self._table.index("pose"):
@@ -353,7 +355,7 @@ def _as_motion(motion: RecordedMotion, states: list[Array], halves: Array | list
     """Return rows of the tool as those of as many axes."""
     count = states[0].shape[1]
     q, qd, qdd = (np.full(count, half) for half in halves)
-    resolution = Resolution(motion.resolution.time, q, qd, qdd, 0.0, motion.resolution.relative_time)
+    resolution = Resolution(motion.resolution.time, q, qd, qdd, relative_time=motion.resolution.relative_time)
     more: Iterator[Array | None] = iter([*states[1:], None, None])
     return replace(
         motion,

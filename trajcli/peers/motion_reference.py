@@ -110,7 +110,7 @@ def _between_ends(outline: _Outline, robot: Robot, duration: float) -> tuple[flo
         return None, report
     resolution = outline.first.resolution
     apart = end.position - start.position
-    rounding = 2 * (resolution.q + resolution.relative * np.abs(end.position))
+    rounding = 2 * (resolution.q + resolution.relative[0] * np.abs(end.position))
     nearer = start.position + np.sign(apart) * np.maximum(np.abs(apart) - rounding, 0.0)
     least = fastest_duration(start, replace(end, position=nearer), robot.limits)
     late = 2 * (resolution.time + resolution.relative_time * abs(float(outline.last.t[0])))

@@ -28,6 +28,7 @@ from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, ColumnExtents, Row
 from trajcli.units import Units
 
 Names = tuple[str, ...] | None
+_STATES = ("q", "qd", "qdd")
 _LARGEST = 1e100  # of a number in a file, in whatever unit
 _KEPT = 1 << 23  # numbers that are kept in memory; of a longer file rows are read anew
 
@@ -44,7 +45,8 @@ class Resolution:
         q: Likewise of the positions, by joint, rad or m, shape (n,).
         qd: Of the velocities, shape (n,); zeros where there are none.
         qdd: Of the accelerations, shape (n,).
-        relative: Of all values, as a share of each: 2^-24 where they were single precision, otherwise 0.
+        relative: Of positions, velocities and accelerations, as a share of each value: 2^-24 where they were
+            single precision, otherwise 0.
         relative_time: Of the time stamps, likewise.
     """
 
@@ -52,7 +54,7 @@ class Resolution:
     q: Array
     qd: Array
     qdd: Array
-    relative: float = 0.0
+    relative: tuple[float, ...] = (0.0, 0.0, 0.0)
     relative_time: float = 0.0
 
 
@@ -252,12 +254,12 @@ class MotionFile:
         # nobody rounds to whole radians, metres or seconds
         half[(decimals <= 0) & (self._factors == 1.0)] = 0.0
         half *= self._factors
-        q, qd, qdd = (self._halves(half, decimals, everywhere, name) for name in ("q", "qd", "qdd"))
+        q, qd, qdd = (self._halves(half, decimals, everywhere, name) for name in _STATES)
         stamp = float(np.spacing(everywhere.largest[self._time]) / 2 / self._per_second)
         time = 0.0 if decimals[self._time] == EXACT else max(float(half[self._time]), stamp)
         relative = self._rows.relative[list(self._taken)]
-        share = float(relative[self._joints["q"]].max())
-        return Resolution(time, q, qd, qdd, share, float(relative[self._time]))
+        shares = tuple(float(relative[self._joints.get(name, [])].max(initial=0.0)) for name in _STATES)
+        return Resolution(time, q, qd, qdd, shares, float(relative[self._time]))
 
     def _halves(
         self, half: Array, decimals: NDArray[np.int64], everywhere: ColumnExtents, quantity: str
