@@ -332,7 +332,7 @@ def test_numbers_of_few_bits_are_as_rough_as_the_largest_of_a_joint(
 
 
 @pytest.mark.parametrize("largest", [0, 1, 2])
-@pytest.mark.parametrize(("share", "broken"), [(0.99, False), (1.01, True)])
+@pytest.mark.parametrize(("share", "broken"), [(0.99, False), (1.01, True), (1.2, True)])
 def test_numbers_of_few_bits_are_as_rough_as_the_largest_of_any_block(
     largest: int, share: float, *, broken: bool
 ) -> None:

@@ -71,9 +71,9 @@ def found(file: Path, name: str, start: np.ndarray) -> ArrayRows | None:
 
 @pytest.mark.parametrize("mm", [False, True])
 @pytest.mark.parametrize("decimals", [7, 9])
-@pytest.mark.parametrize(("wrist", "orders"), [(1.2, (0, 1, 2)), (0.35, (1, 2))])
+@pytest.mark.parametrize("wrist", [1.2, 0.35, 0.1, 0.08])
 def test_decimals_of_joints_cover_what_rounding_of_poses_and_rates_makes(
-    wrist: float, orders: tuple[int, ...], decimals: int, *, mm: bool, tmp_path: Path
+    wrist: float, decimals: int, *, mm: bool, tmp_path: Path
 ) -> None:
     """And not a hundred times as much of positions, nor a thousand times of rates, of which a straighter wrist loses more."""
     file, bent = tmp_path / "rows.csv", np.where(np.arange(6) == 4, wrist, BENT[:6])
@@ -83,7 +83,7 @@ def test_decimals_of_joints_cover_what_rounding_of_poses_and_rates_makes(
     (block,) = back.blocks(range(19), ())
     half = 0.5 * 10.0 ** -back.decimals(range(19)).astype(float)
     assert half[0] == 0.5 * 10.0**-decimals
-    for order in orders:
+    for order in range(3):
         at = slice(1 + 6 * order, 7 + 6 * order)
         off = np.abs(block[:, at] - joints(bent)[order]).max()
         assert 0.0 < off <= half[at].min()

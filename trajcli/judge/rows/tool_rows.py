@@ -154,10 +154,16 @@ def _of_poses(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array)
     poses = TableBlocks(named.names, iter([values]), named.file)
     stream = joints_of(ArmInUnits(arms.own, Units()), poses, start, _TOLERANCE)
     q = np.concatenate(list(stream.blocks))[:, 1:]
-    states = (q, *_rates(arms, moves, q, of_tool))
+    slopes = arms.values(len(q), moves, lambda arm, k: jacobian(arm, q[k]))
+    inverse = np.linalg.pinv(slopes, rcond=0.0)
+    states = (q, *_rates(arms, moves, q, of_tool, inverse))
+    # where each number of a pose is off by one, its turn is off by up to four
+    off = np.abs(inverse[..., :3]).sum(axis=2) + 4.0 * np.linalg.norm(inverse[..., 3:], axis=2)
+    more = int(np.log10(max(off.max(), 1.0)))
     written = of_tool.decimals("x")
-    lost = (_LOST, _RATES_LOST, _RATES_LOST)
-    decimals = tuple(EXACT if written == EXACT else max(written - less, 0) for less in lost)
+    rates = max(2 * more + 1, _RATES_LOST)  # they change with the inverse, which changes with its square
+    lost = (_LOST + more, rates, rates)
+    decimals = tuple(EXACT if written == EXACT else max(written - less, 1) for less in lost)
     return _Found(states, decimals, "the joints are found back from the poses, from the job's start on")
 
 
@@ -181,14 +187,12 @@ def _with_first_tool(of_tool: _ToolRows, arms: ArmsOfMoves, moves: NDArray[np.in
     return values
 
 
-def _rates(arms: ArmsOfMoves, moves: Moves, q: Array, of_tool: _ToolRows) -> list[Array]:
+def _rates(arms: ArmsOfMoves, moves: Moves, q: Array, of_tool: _ToolRows, inverse: Array) -> list[Array]:
     """Return the rates of the joints (N, n) that the file's rates of the tool say, velocities first."""
     if not of_tool.has("twist") or q.shape[1] > 6:
         return []
-    slopes = arms.values(len(q), moves, lambda arm, k: jacobian(arm, q[k]))
-    if np.linalg.cond(slopes).max() > _REGULAR:
+    if np.linalg.cond(inverse).max() > _REGULAR:
         return []
-    inverse = np.linalg.pinv(slopes)
     qd = np.asarray((inverse @ of_tool.group("twist")[..., None])[..., 0])
     if not of_tool.has("twistd"):
         return [qd]
