@@ -90,6 +90,22 @@ def test_decimals_of_joints_cover_what_rounding_of_poses_and_rates_makes(
         assert half[at].max() <= (1e3 if order else 1e2) * off
 
 
+@pytest.mark.parametrize(
+    ("groups", "decimals"),
+    [(("pose", "twist", "twistd"), 4), (("twist", "twistd"), 3)],
+    ids=["poses", "rates"],
+)
+def test_joints_of_few_decimals_are_not_taken_for_exact(
+    groups: tuple[str, ...], decimals: int, tmp_path: Path
+) -> None:
+    """Where all decimals are lost one is left: numbers without any are taken as they are."""
+    bent = np.where(np.arange(6) == 4, 0.08, BENT[:6])
+    written(tmp_path / "rows.csv", table("ur5e", bent, groups), decimals, mm=False)
+    back = found(tmp_path / "rows.csv", "ur5e", joints(bent)[0][0])
+    assert back is not None
+    assert back.decimals(range(len(back.named.names))).min() == 1
+
+
 def test_joints_of_rows_that_were_not_rounded_are_not_either(tmp_path: Path) -> None:
     columns = table("ur5e", BENT[:6], ("pose", "twist", "twistd"))
     rows = np.zeros(T.size, [(name, "f8") for name in columns])
@@ -165,3 +181,15 @@ def test_decimals_of_joints_cover_what_rounding_of_distances_makes(
         )
         assert 0.0 < off.max() <= half[at].min()
         assert half[at].max() <= too_much * off.max()
+
+
+def test_joints_of_distances_in_whole_millimetres_are_not_taken_for_exact(tmp_path: Path) -> None:
+    plan, file = planned(TWO_MOVES, "[t, path]"), tmp_path / "rows.csv"
+    write_plan(plan, str(file), "full")
+    head, *lines = file.read_text(encoding="utf-8").splitlines()
+    rows = ([float(cell) for cell in line.split(",")] for line in lines)
+    texts = (",".join([f"{t:.9f}", *(f"{v:.0f}" for v in s)]) for t, *s in rows)
+    file.write_text("\n".join([head, *texts]) + "\n", encoding="utf-8")
+    back = joints_found_back(ByteSource(str(file)), plan.loaded.robot_of_rows, plan)
+    assert back is not None
+    assert back.decimals(range(1, 19)).min() == 1

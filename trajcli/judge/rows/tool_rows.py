@@ -241,7 +241,7 @@ def _of_twists(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array
         states.append(np.asarray((inverse @ remainder[..., None])[..., 0]))
     written = of_tool.decimals("vx")
     lost = _RATES_LOST + int(np.ceil(np.log10(max(float(t[-1] - t[0]), 1.0))))  # roundings add up
-    digits = EXACT if written == EXACT else max(written - lost, 0)
+    digits = EXACT if written == EXACT else max(written - lost, 1)
     note = "the joints are integrated from the velocities of the tool, from the job's start on"
     return _Found(tuple(states), (digits,) * 3, note)
 
@@ -273,7 +273,7 @@ def _along_paths(of_tool: _ToolRows, plan: Plan) -> _Found:
         qdd[rows] = found[2] * np.square(sd)[:, None] + found[1] * sdd[:, None]
     written = of_tool.decimals("s")
     decimals = tuple(
-        EXACT if written == EXACT else max(written - less, 0) for less in (_LOST, _RATES_LOST, _RATES_LOST)
+        EXACT if written == EXACT else max(written - less, 1) for less in (_LOST, _RATES_LOST, _RATES_LOST)
     )
     note = "the joints follow the paths of the job; in moves without a path they are those of the plan"
     return _Found((q, qd, qdd), decimals, note)
