@@ -195,7 +195,8 @@ def test_rounding_by_a_share_of_each_number_explains_what_it_may(row: int, name:
     relative, joint = 2.0**-24, 1
     states = [State(each, np.full(3, 20.0), np.zeros(3)) for each in (START, END)]
     given = replace(motion(np.zeros(3)), qd=np.full((4, 3), 20.0))
-    single = replace(given, resolution=replace(given.resolution, relative=(relative,) * 3))
+    shares = tuple(relative * (each == name) for each in ("q", "qd", "qdd"))  # its own alone
+    single = replace(given, resolution=replace(given.resolution, relative=shares))
     required = Requirements(
         bare_robot(unlimited(3)),
         start=states[0],

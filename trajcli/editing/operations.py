@@ -168,9 +168,10 @@ def _check_states_agree(first: EditedMotion, second: EditedMotion) -> None:
         if ends[0] is None or ends[1] is None:
             continue
         before, after = ends[0][-1], ends[1][0]
-        resolutions = [getattr(motion.rows.resolution, name) for motion in (first, second)]
-        relative = sum(motion.rows.resolution.relative[order] for motion in (first, second))
-        room = 2 * sum(resolutions) + relative * np.abs(after) + _SAME * (1 + np.abs(after))
+        halves, shares = zip(
+            *(each.rows.resolution.roundings[order] for each in (first, second)), strict=True
+        )
+        room = 2 * sum(halves) + sum(shares) * np.abs(after) + _SAME * (1 + np.abs(after))
         problems += [
             _jump(first, second, joint, what, (float(before[joint]), float(after[joint])))
             for joint in np.flatnonzero(np.abs(after - before) > room).tolist()

@@ -99,8 +99,7 @@ class Changes:
 def changes_of(window: Intervals) -> list[Changes]:
     """Return how positions, velocities and accelerations change, as far as the rows have them."""
     states = window.states
-    resolution, length, late = window.resolution, window.lengths[:, None], window.late[:, None]
-    roundings = list(zip((resolution.q, resolution.qd, resolution.qdd), resolution.relative, strict=True))
+    roundings, length, late = window.resolution.roundings, window.lengths[:, None], window.late[:, None]
     found = []
     for order, values in enumerate(states):
         if values is None:

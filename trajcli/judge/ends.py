@@ -79,7 +79,7 @@ def _position(
     time, number, (q, *_) = row
     if q is None:
         return []
-    slack = stated_errors(q, resolution.q, resolution.relative[0])[0]
+    slack = stated_errors(q, *resolution.roundings[0])[0]
     over = np.abs(q[0] - wanted) - tolerance
     joint = int(np.where(over > 0, over - slack, -np.inf).argmax())  # roundings differ by joint
     if over[joint] <= 0:
@@ -126,9 +126,8 @@ def _rate(
     rates = states[order]
     if rates is None or not np.isfinite(rates).all():
         return []
-    rounding = (resolution.qd, resolution.qdd)[order - 1]
     said = np.isfinite(wanted)
-    slack = stated_errors(rates, rounding, resolution.relative[order])[0] + _REST
+    slack = stated_errors(rates, *resolution.roundings[order])[0] + _REST
     over = np.where(said, np.abs(rates[0] - wanted), 0.0)
     joint = int((over - slack).argmax())
     if over[joint] <= slack[joint]:

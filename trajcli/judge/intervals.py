@@ -112,11 +112,8 @@ class Intervals:
             joint: Of each the index of a joint.
             count: How many of position, velocity and acceleration the pieces use.
         """
-        roundings = (self.resolution.q, self.resolution.qd, self.resolution.qdd)
         ends, errors = [], []
-        for values, rounding, share in zip(
-            self.states[:count], roundings, self.resolution.relative, strict=False
-        ):
+        for values, (rounding, share) in zip(self.states[:count], self.resolution.roundings, strict=False):
             if values is None:
                 break
             both = np.stack([values[piece, joint], values[piece + 1, joint]])

@@ -139,12 +139,10 @@ class _Judge:
     def see(self, motion: RecordedMotion, values: Array) -> None:
         """Compare more rows of joints, and those of the tool beside them, (N, m)."""
         poses = self._seen.values(motion.t.size, motion.move, lambda arm, k: forward(arm, motion.q[k]))
-        off = motion.resolution
+        off = motion.resolution.roundings
         errors = [
-            stated_errors(rows, rounding, share).sum(axis=1)
-            for rows, rounding, share in zip(
-                (motion.q, motion.qd, motion.qdd), (off.q, off.qd, off.qdd), off.relative, strict=True
-            )
+            stated_errors(rows, *each).sum(axis=1)
+            for rows, each in zip((motion.q, motion.qd, motion.qdd), off, strict=True)
             if rows is not None
         ]
         if self._table.index("pose"):

@@ -115,7 +115,7 @@ class RecordedPath:
 
     def _slack_of(self, q: Array, window: Intervals) -> Array:
         """Return by how much the tool may be off by the rounding of the rows, m and rad alike, (N,)."""
-        off = stated_errors(q, np.asarray(window.resolution.q), window.resolution.relative[0])
+        off = stated_errors(q, *window.resolution.roundings[0])
         return np.asarray(2.0 * max(self._arm, 1.0) * off.sum(axis=1))
 
     def _judge(

@@ -45,8 +45,7 @@ class Resolution:
         q: Likewise of the positions, by joint, rad or m, shape (n,).
         qd: Of the velocities, shape (n,); zeros where there are none.
         qdd: Of the accelerations, shape (n,).
-        relative: Of positions, velocities and accelerations, as a share of each value: 2^-24 where they were
-            single precision, otherwise 0.
+        relative: Of q, qd and qdd as a share of each value: 2^-24 where they were single precision.
         relative_time: Of the time stamps, likewise.
     """
 
@@ -56,6 +55,11 @@ class Resolution:
     qdd: Array
     relative: tuple[float, ...] = (0.0, 0.0, 0.0)
     relative_time: float = 0.0
+
+    @property
+    def roundings(self) -> list[tuple[Array, float]]:
+        """Of positions, velocities and accelerations, in units and as a share."""
+        return list(zip((self.q, self.qd, self.qdd), self.relative, strict=True))
 
 
 @frozen

@@ -155,13 +155,13 @@ def _of_poses(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array)
     stream = joints_of(ArmInUnits(arms.own, Units()), poses, start, _TOLERANCE)
     q = np.concatenate(list(stream.blocks))[:, 1:]
     slopes = arms.values(len(q), moves, lambda arm, k: jacobian(arm, q[k]))
-    inverse = np.linalg.pinv(slopes, rcond=0.0)
+    inverse = np.asarray(np.linalg.pinv(slopes, rcond=0.0), dtype=np.float64)
     states = (q, *_rates(arms, moves, q, of_tool, inverse))
-    # where each number of a pose is off by one, its turn is off by up to four
+    # a turn is off by up to four times its quaternion
     off = np.abs(inverse[..., :3]).sum(axis=2) + 4.0 * np.linalg.norm(inverse[..., 3:], axis=2)
     more = int(np.log10(max(off.max(), 1.0)))
     written = of_tool.decimals("x")
-    rates = max(2 * more + 1, _RATES_LOST)  # they change with the inverse, which changes with its square
+    rates = max(2 * more + 1, _RATES_LOST)
     lost = (_LOST + more, rates, rates)
     decimals = tuple(EXACT if written == EXACT else max(written - less, 1) for less in lost)
     return _Found(states, decimals, "the joints are found back from the poses, from the job's start on")
