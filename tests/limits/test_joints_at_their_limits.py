@@ -14,7 +14,8 @@ from trajcli.findings import Finding
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.limits import joints, velocity_by_position
 from trajcli.limits.joints import JointSurvey
-from trajcli.trajectory import State
+from trajcli.limits.kinds import LimitedMove
+from trajcli.trajectory import Span, State, Trajectory
 
 END, D, OFFSET = 2.0, 6.0, 0.3
 UNLIMITED = np.array([[-np.inf, np.inf]])
@@ -232,3 +233,44 @@ def test_a_path_is_refused_for_the_joint_that_may_not_move_at_either_end(joint: 
         (problem,) = caught.value.problems
         assert problem.joint == f"j{joint}"
         assert problem.amounts["distance"].value == pytest.approx(near, abs=1e-9)
+
+
+@pytest.mark.parametrize(("position", "limit"), [(0.2, 0.5), (-0.2, 0.5), (2.2, 2.0)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_state_outside_a_range_that_does_not_hold_zero_is_told_the_end_that_it_is_beyond(
+    sign: int, position: float, limit: float
+) -> None:
+    bounds = Limits(np.sort(sign * np.array([[0.5, 2.0]])), *[UNLIMITED] * 3)
+    state = State(np.array([sign * position]), np.zeros(1), np.zeros(1))
+    _, amounts = joints.FAMILY.why_not_in_state(one_joint(bounds), state) or ("", {})
+    assert amounts["limit"] == Amount(sign * limit, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("begins", "ends", "kinds"), [(0.0, 1.0, {"velocity", "acceleration"}), (1.0, 1.0, {"velocity"})]
+)
+def test_a_move_of_no_duration_has_no_acceleration_and_no_factor(
+    begins: float, ends: float, kinds: set[str]
+) -> None:
+    """At 1 s it goes 2 rad/s and accelerates with 2 rad/s^2; nothing that takes no time can take longer."""
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[1.0]], [[0.0]], [[0.0]]]))
+    span = Span(0, "quintic", begins, ends, 2)
+    start, end = (State(np.array([q]), np.array([v]), np.array([2.0])) for q, v in ((0.0, 0.0), (1.0, 2.0)))
+    whole = Trajectory(curve, ("j1",), ("revolute",), (span,), start, end)
+    one = np.array([[-1.0, 1.0]])
+    survey = joints.FAMILY.survey(LimitedMove(whole, span, Limits(UNLIMITED, one, one, UNLIMITED)))
+    found = list(survey.over(whole))
+    assert {each.kind for each in found} == kinds
+    assert all((each.factor is None) is (begins == ends) for each in found)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_motion_is_stretched_for_any_derivative_in_either_direction(order: int, side: int) -> None:
+    one = np.array([[-1.0, 1.0]])
+    peaks = [Peaks(*(np.zeros(1) for _ in range(4))) for _ in range(4)]
+    low, high = sorted((0.25 * -side, 1.5 * side))
+    peaks[order] = Peaks(np.array([low]), np.array([0.1]), np.array([high]), np.array([0.2]))
+    assert JointSurvey(tuple(peaks), Limits(one, one, one, one)).excess() > 0.1
+    wide = [2.0 * one if k == order else one for k in range(4)]
+    assert JointSurvey(tuple(peaks), Limits(*wide)).excess() < 0
