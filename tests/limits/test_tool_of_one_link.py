@@ -17,7 +17,7 @@ from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
 from trajcli.limits import tool_bound
 from trajcli.limits.kinds import TOOL_KINDS, LimitedMove
-from trajcli.limits.tool import FAMILY, ToolSurvey
+from trajcli.limits.tool import FAMILY, ToolSurvey, unjudged
 from trajcli.limits.tool_bound import speed_runs, tool_bounds
 from trajcli.trajectory import Span, State, Trajectory
 
@@ -81,6 +81,42 @@ def test_steps_of_accelerations_whose_derivatives_are_limited(joint: int, at: in
     assert near(steps_of(move, angular_jerk=9.0), turning)
     assert near(steps_of(move, jerk=9.0, angular_jerk=9.0), along | turning)
     assert near(steps_of(move, angular_jerk=9.0, speed=1.0, acceleration=9.0), turning)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_a_move_behind_another_one_has_the_steps_of_its_own_breaks(at: int, sign: float) -> None:
+    """The same motion, of which the first third is a move of its own: what it steps by before is not of this one."""
+    whole = stepping(0, at, sign)
+    span = Span(1, "trapezoid", 0.1, whole.span.end, 2)
+    found = steps_of(replace(whole, span=span), jerk=9.0)
+    assert list(found.values()) == ([pytest.approx((STEP * LEVER, 0.1 * at - 0.1))] if at else [])
+
+
+@pytest.mark.parametrize(("share", "seen"), [(1e-7, True), (-1e-7, True), (1e-15, False)])
+def test_a_step_that_is_small_beside_the_acceleration_is_one_above_rounding(share: float, seen: bool) -> None:
+    """Both states say the accelerations that the motion has there: only the last break steps."""
+    move = stepping(0, 0, 1.0)
+    curve, ends = move.trajectory.curve, np.array([STEP, 0.0])
+    rows = curve.coefficients.copy()
+    rows[0, 2, 0] *= 1.0 + share
+    start, end = (replace(each, acceleration=ends) for each in (move.trajectory.start, move.trajectory.end))
+    end = replace(end, acceleration=2.0 * rows[0, 2])
+    other = replace(move.trajectory, curve=PiecewisePolynomial(curve.breaks, rows), start=start, end=end)
+    found = steps_of(replace(move, trajectory=other), jerk=9.0)
+    assert bool(found) is seen
+    if seen:
+        assert found["acceleration"] == (
+            pytest.approx(STEP * LEVER * abs(share), rel=1e-6),
+            pytest.approx(0.2),
+        )
+
+
+def test_limits_of_the_tool_of_an_arm_without_geometry_are_judged_by_nobody() -> None:
+    known = arm(speed=1.0, angular_jerk=2.0)
+    assert unjudged(known.limits, known) == set()
+    for blind in (None, replace(known, convention=None)):
+        assert unjudged(known.limits, blind) == {"speed", "angular_jerk"}
 
 
 @pytest.mark.parametrize("joint", [0, 1])
