@@ -188,6 +188,20 @@ def test_any_joint_brakes_in_any_move(joint, side, how):
 
 
 @pytest.mark.parametrize("how", ["each", "line"])
+@pytest.mark.parametrize("late", [0.0, 0.01])
+def test_a_move_brakes_from_what_the_one_before_has_sped_up_to(late, how):
+    """From 0.5 to 3 rad/s in 1.75 s under wide limits, and back as fast: inside after 1.25 s, or later than could be."""
+    faster, brakes = [(0.5, 4.0), (0.75, 0.0), (0.5, -4.0)], [(0.5, -4.0), (0.75, 0.0), (0.5, 4.0)]
+    both = _motion(0.5, 0.0, [*faster, *([(late, 0.0)] if late else []), *brakes])
+    end = both.curve.duration
+    spans = Span(0, "jerk_limited", 0.0, 1.75, 2), Span(1, "jerk_limited", 1.75, end, 2)
+    whole = Trajectory(both.curve, ("a", "b"), ("revolute",) * 2, spans, both.start, both.end)
+    promises = [Promise(), Promise(braking=how)]
+    found = verify(whole, [_limits(velocity=3.0), _limits()], promises).findings
+    assert [(each.move, each.kind) for each in found] == ([(1, "velocity")] if late else [])
+
+
+@pytest.mark.parametrize("how", ["each", "line"])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_where_an_acceleration_leads_is_excused_in_either_direction(side, how):
     """From 0.9 rad/s with 2 rad/s^2 the joint cannot but reach 1.4; a tenth of a second more of it is too much."""
