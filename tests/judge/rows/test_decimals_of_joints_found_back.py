@@ -23,6 +23,7 @@ from trajcli.output.write import write_plan
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.row_sources import EXACT, ArrayRows
 
+ROOT = Path(__file__).resolve().parents[3]
 T = np.linspace(0.0, 0.5, 11)
 BENT = np.array([0.2, -1.3, 1.6, -1.4, 1.2, 0.3, 0.4])  # far from singularities
 LENGTHS = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
@@ -193,3 +194,42 @@ def test_joints_of_distances_in_whole_millimetres_are_not_taken_for_exact(tmp_pa
     back = joints_found_back(ByteSource(str(file)), plan.loaded.robot_of_rows, plan)
     assert back is not None
     assert back.decimals(range(1, 19)).min() == 1
+
+
+@pytest.mark.parametrize(("lengths", "turns"), [(9, 6), (6, 9)])
+@pytest.mark.parametrize("groups", [("pose",), ("twist", "twistd")], ids=["poses", "rates"])
+def test_joints_are_known_as_well_as_the_coarser_of_places_and_turns(
+    groups: tuple[str, ...], lengths: int, turns: int, tmp_path: Path
+) -> None:
+    """A place in mm has three decimals more than it is written with, a quaternion has not."""
+    columns = table("ur5e", BENT[:6], groups)
+    rounded = {
+        name: np.round(values, lengths if name in LENGTHS else turns) for name, values in columns.items()
+    }
+    text = [
+        [f"{v:.{lengths if name in LENGTHS else 6 if name == 't' else turns}f}" for v in values]
+        for name, values in rounded.items()
+    ]
+    lines = [",".join(columns), *(",".join(row) for row in zip(*text, strict=True))]
+    (tmp_path / "rows.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    back = found(tmp_path / "rows.csv", "ur5e", joints(BENT[:6])[0][0])
+    assert back is not None
+    (block,) = back.blocks(range(7), ())
+    off = np.abs(block[:, 1:] - joints(BENT[:6])[0]).max()
+    half = 0.5 * 10.0 ** -float(back.decimals(range(7))[1:].min())
+    assert half >= 5e-6 if groups == ("pose",) else half >= 5e-4
+    assert half >= min(off, 5e-6)
+
+
+def test_turns_that_stay_as_they_are_may_be_whole_numbers(tmp_path: Path) -> None:
+    """The tool of a gantry points down: its quaternion is written 0,1,0,0, and x, which stays, as 0.3."""
+    gantry, start = str(ROOT / "examples" / "robots" / "gantry.yaml"), np.array([0.3, 0.2, 0.2])
+    columns = table(gantry, start, ("pose",))
+    assert np.ptp(columns["qx"]) < 1e-12
+    columns["x"][:], decimals = 0.3, {"x": 1, "y": 6, "z": 6, "t": 6}
+    text = [[f"{v + 0.0:.{decimals.get(name, 0)}f}" for v in values] for name, values in columns.items()]
+    lines = [",".join(columns), *(",".join(row) for row in zip(*text, strict=True))]
+    (tmp_path / "rows.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    back = found(tmp_path / "rows.csv", gantry, joints(start)[0][0])
+    assert back is not None
+    assert back.decimals(range(4)).tolist() == [6, 5, 5, 5]

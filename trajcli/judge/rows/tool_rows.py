@@ -9,6 +9,8 @@ file has distances s along the paths of the job alone, the joints follow these p
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,13 +63,26 @@ class _ToolRows:
         at = [index for kind in kinds_of(group) if (index := self.index(kind)) is not None]
         return np.asarray(self.values[:, at] * [self.columns[k].factor for k in at])
 
-    def decimals(self, kind: str) -> int:
-        """Return the decimals of a column, in m or rad; `EXACT` where nothing is rounded."""
-        at = self.index(kind)
-        assert at is not None  # noqa: S101
-        found = int(self.rows.decimals(range(len(self.columns)))[at])
-        # a millimetre has three decimals of a metre, a degree nearly two of a radian
-        return found if found == EXACT else found + {"mm": 3, "deg": 1}.get(self.columns[at].unit or "", 0)
+    def decimals(self, *quantities: Sequence[str], lost: Sequence[int]) -> tuple[int, ...]:
+        """Return the decimals, in m or rad, that are left of the coarsest quantity; `EXACT` of exact ones.
+
+        Whole numbers that stay as they are do not count.
+
+        Args:
+            quantities: The kinds of their columns.
+            lost: How many states of joints do not have.
+        """
+        written, coarsest = self.rows.decimals(range(len(self.columns))), list[int]()
+        for kinds in quantities:
+            at = [k for kind in kinds if (k := self.index(kind)) is not None and written[k] != EXACT]
+            # a millimetre has three decimals of a metre, a degree nearly two of a radian
+            found = [
+                int(written[k]) + {"mm": 3, "deg": 1}.get(self.columns[k].unit or "", 0)
+                for k in at
+                if written[k] or np.ptp(self.values[:, k])
+            ]
+            coarsest += [max(found)] if found else []
+        return tuple(max(min(coarsest) - less, 1) if coarsest else EXACT for less in lost)
 
 
 @frozen
@@ -160,10 +175,8 @@ def _of_poses(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array)
     # a turn is off by up to four times its quaternion
     off = np.abs(inverse[..., :3]).sum(axis=2) + 4.0 * np.linalg.norm(inverse[..., 3:], axis=2)
     more = int(np.log10(max(off.max(), 1.0)))
-    written = of_tool.decimals("x")
-    rates = max(2 * more + 1, _RATES_LOST)
-    lost = (_LOST + more, rates, rates)
-    decimals = tuple(EXACT if written == EXACT else max(written - less, 1) for less in lost)
+    rates, kinds = max(2 * more + 1, _RATES_LOST), kinds_of("pose")
+    decimals = of_tool.decimals(kinds[:3], kinds[3:], lost=(_LOST + more, rates, rates))
     return _Found(states, decimals, "the joints are found back from the poses, from the job's start on")
 
 
@@ -239,11 +252,10 @@ def _of_twists(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array
         remainder = twistd - jacobian_dot_qd(robot, q, qd)
         inverse = np.linalg.pinv(jacobian(robot, q), rcond=1.0 / _REGULAR)
         states.append(np.asarray((inverse @ remainder[..., None])[..., 0]))
-    written = of_tool.decimals("vx")
     lost = _RATES_LOST + int(np.ceil(np.log10(max(float(t[-1] - t[0]), 1.0))))  # roundings add up
-    digits = EXACT if written == EXACT else max(written - lost, 1)
+    decimals = of_tool.decimals(kinds_of("twist")[:3], kinds_of("twist")[3:], lost=(lost,) * 3)
     note = "the joints are integrated from the velocities of the tool, from the job's start on"
-    return _Found(tuple(states), (digits,) * 3, note)
+    return _Found(tuple(states), decimals, note)
 
 
 def _along_paths(of_tool: _ToolRows, plan: Plan) -> _Found:
@@ -271,10 +283,7 @@ def _along_paths(of_tool: _ToolRows, plan: Plan) -> _Found:
             ) from error
         q[rows], qd[rows] = found[0], found[1] * sd[:, None]
         qdd[rows] = found[2] * np.square(sd)[:, None] + found[1] * sdd[:, None]
-    written = of_tool.decimals("s")
-    decimals = tuple(
-        EXACT if written == EXACT else max(written - less, 1) for less in (_LOST, _RATES_LOST, _RATES_LOST)
-    )
+    decimals = of_tool.decimals(("s",), lost=(_LOST, _RATES_LOST, _RATES_LOST))
     note = "the joints follow the paths of the job; in moves without a path they are those of the plan"
     return _Found((q, qd, qdd), decimals, note)
 
