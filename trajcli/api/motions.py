@@ -156,7 +156,7 @@ def resample(file: str | Path, rate: float, *, output: str | Path | None = None)
 
 def _continuous(before: EditedMotion, motion: Motion, output: str | Path | None) -> Motion:
     """Return a motion, written where that is asked for; refuse one that jumps where the file does not."""
-    from trajcli.editing.continuity import new_jumps
+    from trajcli.editing.kept_limits import new_jumps
 
     problems = new_jumps(before, motion.edited)
     if problems:

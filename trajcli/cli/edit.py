@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trajcli.cli.outcome import print_remark
-from trajcli.editing.continuity import new_jumps, worst_deviation
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
+from trajcli.editing.kept_limits import kept_limits, new_jumps, worst_deviation
 from trajcli.editing.operations import cut, join, resample, reverse
 from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
@@ -115,7 +115,6 @@ def run_retime(options: RetimeCommand) -> int:
     Raises:
         TrajcliError: When anything is wrong; then nothing was written.
     """
-    from trajcli.editing.kept_limits import kept_limits
     from trajcli.editing.retiming import retime
     from trajcli.queries.arm import stated_units
     from trajcli.streams.byte_source import ByteSource
