@@ -170,3 +170,11 @@ class Arm:
 
     joint_names = ("a", "b")
     joint_types = ("revolute", "prismatic")
+
+
+@pytest.mark.parametrize("kind", ["start", "end"])
+def test_a_state_that_is_missed_comes_before_limits_that_are_passed(kind: str) -> None:
+    """Its value over what was expected says nothing: an arm at 0 instead of 0.009 rad is no smaller fault than at 0.02."""
+    missed = [Finding(kind=kind, value=value, limit=0.009) for value in (0.0, 0.02)]
+    passed = Finding(kind="velocity", value=1.1, limit=1.0)
+    assert all(finding.excess > passed.excess for finding in missed)

@@ -18,7 +18,7 @@ FindingSeverity = Literal["error", "warning"]
 Certainty = Literal["exceeded", "within rounding"]
 
 _RATES = ("", "/s", "/s^2", "/s^3")
-_UNORDERED = ("jump", "time", "derivative")
+_UNORDERED = ("jump", "time", "derivative", "start", "end")
 """Kinds whose value is no part of their limit."""
 
 
