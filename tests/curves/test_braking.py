@@ -123,3 +123,23 @@ def test_what_is_beyond_a_bound_by_more_than_rounding_is_beyond(beyond, brakes, 
     there = braking(side * bound * (1 + beyond), 0.0, bounds)
     assert bool(there.phases) == brakes
     assert abs(there.fastest) == pytest.approx(bound, rel=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_brakes_too_hard_is_brought_to_its_bound_first(side):
+    """From -5 to -3 at a jerk of 10 takes 0.2 s; the velocity falls by 0.8 meanwhile, and by 0.2 at -3 after that."""
+    bounds = np.array([[-100.0, 1.0], [-3.0, 4.0], [-10.0, 10.0]])
+    bounds = bounds if side > 0 else -bounds[:, ::-1]
+    found = braking(side * 2.0, side * -5.0, bounds)
+    assert found.acceleration == pytest.approx(0.2)
+    assert found.velocity == pytest.approx(0.2 + 0.2 / 3.0)
+    assert found.fastest == side * 2.0, "it slows down from the first moment on"
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_other_bound_is_not_left_while_the_velocity_comes_back(side):
+    """From 1.3 down to -2 at a jerk of 10, in 0.2 s, from where the same jerk up ends at rest on the lower bound of 0.9."""
+    bounds = np.array([[0.9, 1.0], [-3.0, 4.0], [-10.0, 10.0]])
+    bounds = bounds if side > 0 else -bounds[:, ::-1]
+    found = braking(side * 1.3, 0.0, bounds)
+    assert found.velocity == pytest.approx(0.2 + (2.0 - np.sqrt(2.0)) / 10.0)
