@@ -9,8 +9,8 @@ import pytest
 from motions_on_disk import JOB, planned, quintic, table
 
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
-from trajcli.editing.kept_limits import new_jumps, worst_deviation
 from trajcli.editing.operations import cut, join, resample, reverse
+from trajcli.editing.requirements import new_jumps, worst_deviation
 from trajcli.editing.writing import write_motion
 from trajcli.errors import InputError, VerificationError
 from trajcli.units import Units

@@ -11,7 +11,7 @@ from motions_on_disk import JOB, planned, quintic, table
 
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
-from trajcli.editing.kept_limits import kept_limits
+from trajcli.editing.requirements import kept_limits
 from trajcli.editing.retiming import Stretch, retime
 from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError

@@ -10,7 +10,7 @@ import pytest
 from tiers import few
 
 from trajcli.editing.edited_motion import ReadingOptions, read_motion
-from trajcli.editing.kept_limits import kept_limits
+from trajcli.editing.requirements import kept_limits
 from trajcli.editing.retiming import retime
 from trajcli.errors import InputError
 from trajcli.grids import ListedGrid

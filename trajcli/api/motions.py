@@ -113,7 +113,7 @@ def retime(
         VerificationError: When no time keeps the limits.
         FileError: When a file cannot be read or written.
     """
-    from trajcli.editing.kept_limits import kept_limits
+    from trajcli.editing.requirements import kept_limits
     from trajcli.editing.retiming import retime as retimed
     from trajcli.editing.writing import as_read
 
@@ -156,7 +156,7 @@ def resample(file: str | Path, rate: float, *, output: str | Path | None = None)
 
 def _continuous(before: EditedMotion, motion: Motion, output: str | Path | None) -> Motion:
     """Return a motion, written where that is asked for; refuse one that jumps where the file does not."""
-    from trajcli.editing.kept_limits import new_jumps
+    from trajcli.editing.requirements import new_jumps
 
     problems = new_jumps(before, motion.edited)
     if problems:

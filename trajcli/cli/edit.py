@@ -10,8 +10,8 @@ import numpy as np
 
 from trajcli.cli.outcome import print_remark
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
-from trajcli.editing.kept_limits import kept_limits, new_jumps, worst_deviation
 from trajcli.editing.operations import cut, join, resample, reverse
+from trajcli.editing.requirements import kept_limits, new_jumps, worst_deviation
 from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
 from trajcli.streams.formats import format_of
