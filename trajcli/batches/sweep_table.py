@@ -220,8 +220,8 @@ def _draw_map(figure: Any, plane: Any, table: SweepTable) -> None:  # noqa: ANN4
         colours[y, x], asked[y, x] = duration, 1.0
         if row.point.verdict != "verified" and np.isfinite(duration):
             beyond.append((x, y))
-    _named(plane.xaxis, across)
-    _named(plane.yaxis, up)
+    _label_ticks(plane.xaxis, across)
+    _label_ticks(plane.yaxis, up)
     plane.set_ylabel(shortened(table.paths[1], _SIZE, _HEIGHT - 1), fontsize=_SIZE)
     grey = np.where(asked[..., None] > 0, _rgb(_NOWHERE), 1.0)
     plane.imshow(grey, origin="lower", aspect="auto", interpolation="nearest")
@@ -257,11 +257,11 @@ def _abscissas(axis: Any, values: tuple[str, ...]) -> Array:  # noqa: ANN401
     try:
         return np.array([float(value) for value in values])
     except ValueError:
-        _named(axis, values)
+        _label_ticks(axis, values)
         return np.arange(len(values), dtype=np.float64)
 
 
-def _named(axis: Any, values: tuple[str, ...]) -> None:  # noqa: ANN401
+def _label_ticks(axis: Any, values: tuple[str, ...]) -> None:  # noqa: ANN401
     """Write values below an axis, as many as there is room for."""
     step = -(-len(values) // _TICKS)
     chosen = range(0, len(values), step)

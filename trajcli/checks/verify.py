@@ -163,7 +163,7 @@ def _over_limits(
 ) -> list[Finding]:
     """Return where moves break limits of joints, and further ones where these are the same all along."""
     whole = [not promise.parts for promise in moves.promises]
-    judged = _judged(moves.trajectory, moves.limits, moves.promises, peaks)
+    judged = _counting_extremes(moves.trajectory, moves.limits, moves.promises, peaks)
     findings = check_limits(moves.trajectory, moves.limits, judged, whole)
     for k, (of_span, one) in enumerate(zip(surveys, whole, strict=True)):
         for survey in of_span.values() if one else ():
@@ -255,7 +255,7 @@ def _further_surveys(moves: _LimitedMoves) -> Iterator[Mapping[str, LimitSurvey]
         yield {name: survey for name, survey in surveys.items() if survey is not None}
 
 
-def _judged(
+def _counting_extremes(
     trajectory: Trajectory,
     limits_by_move: Sequence[Limits],
     promises: Sequence[Promise],

@@ -56,7 +56,7 @@ def run_check(options: CheckCommand) -> int:
     found, problems = list[dict[str, Any]](), list[Problem]()
     for file in files:
         try:
-            checked, beside = _judged(file, options)
+            checked, beside = _checked_file(file, options)
         except TrajcliError as error:
             if alone:
                 raise
@@ -93,7 +93,7 @@ def _form(
     return "json" if options.as_json else options.form
 
 
-def _judged(file: str, options: CheckCommand) -> tuple[CheckedFile, MotionReference | None]:
+def _checked_file(file: str, options: CheckCommand) -> tuple[CheckedFile, MotionReference | None]:
     checked = check_file(file, options.part(CheckOptions), delivered=_delivered)
     if not options.reference:
         return checked, None

@@ -28,7 +28,7 @@ def run_plan(options: PlanCommand) -> int:
     if len(jobs) > 1:
         _check_nothing_is_written(options)
     if form == "text" or form == "json":
-        return max(_judged(job, options) for job in jobs)
+        return max(_exit_code_of_job(job, options) for job in jobs)
     return _annotated(jobs, options, form)
 
 
@@ -40,7 +40,7 @@ def _check_nothing_is_written(options: PlanCommand) -> None:
         raise InputError(f"--{name} is about one job, and there are several", hint="name one job")
 
 
-def _judged(job: str, options: PlanCommand) -> int:
+def _exit_code_of_job(job: str, options: PlanCommand) -> int:
     """Judge one of several jobs; report what is wrong with it, and return its exit code."""
     try:
         plan_and_write(job, options)

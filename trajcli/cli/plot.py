@@ -53,7 +53,7 @@ def run_plot(options: PlotCommand) -> int:
     _check_inputs_stay(plans, rows, target)
     sources = [ByteSource(name) for name in rows]
     tables = [read_table(source) for source in sources]
-    judged = [] if plan is None else _judged(sources, plan, options)
+    judged = [] if plan is None else _checked_files(sources, plan, options)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its caches are is nobody's concern
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
         judgements = [None if checked is None else checked.judgement for checked in judged]
@@ -65,7 +65,9 @@ def run_plot(options: PlotCommand) -> int:
     return 0
 
 
-def _judged(sources: Sequence[ByteSource], plan: Plan, options: PlotCommand) -> list[CheckedFile | None]:
+def _checked_files(
+    sources: Sequence[ByteSource], plan: Plan, options: PlotCommand
+) -> list[CheckedFile | None]:
     """Return the judgement of each file by the job; None, with a remark, where it cannot be judged."""
     if not sources:
         return []

@@ -149,7 +149,7 @@ def pose_lines(move: ExplainedMove) -> Iterator[str]:
         if pose is not None:
             units = ", ".join(dict.fromkeys(pose.units))
             yield f"  {head}: joints {numbers(pose.joints)} ({units})"
-            branch = _named(pose.branch) if pose.branch else f"without a name ({pose.method})"
+            branch = _listed_names(pose.branch) if pose.branch else f"without a name ({pose.method})"
             yield f"    branch: {branch}; {_singular(pose)}"
             yield f"    chosen: {_choice(pose.chosen, origin)}"
             if pose.free_direction is not None:
@@ -157,7 +157,7 @@ def pose_lines(move: ExplainedMove) -> Iterator[str]:
                 yield f"    the arm can move without leaving the pose: joints along {along}"
 
 
-def _named(names: Mapping[str, str]) -> str:
+def _listed_names(names: Mapping[str, str]) -> str:
     return ", ".join(f"{choice} {name}" for choice, name in names.items())
 
 
@@ -173,6 +173,6 @@ def _choice(chosen: ChoiceReport, origin: str) -> str:
     nearest = f"the nearest to {origin}"
     if not chosen.configuration:
         return answers + nearest
-    named = f"{_named(chosen.configuration)} as the configuration says"
+    named = f"{_listed_names(chosen.configuration)} as the configuration says"
     count = chosen.candidates
     return answers + (f"{count} have {named}; of these {nearest}" if count > 1 else f"1 has {named}")

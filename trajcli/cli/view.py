@@ -115,7 +115,7 @@ def _shown_file(name: str, robot: str | None, output: str | None, meshes: float)
 
     _check_inputs_stay(output, [name])
     opened = ByteSource(name)
-    checked = None if robot is None else _judged(opened, robot)
+    checked = None if robot is None else _checked_or_reason(opened, robot)
     scene = scene_of_file(opened, robot, checked, meshes)
     said = f"{scene['title']}: {scene['verdict']['text']}, {scene['subtitle']}"
     if checked is None or isinstance(checked, str) or checked.judgement.passed:
@@ -125,7 +125,7 @@ def _shown_file(name: str, robot: str | None, output: str | None, meshes: float)
     return _Shown(scene, said, lambda: problems_of(checked, every=False))
 
 
-def _judged(source: ByteSource, robot: str) -> CheckedFile | str:
+def _checked_or_reason(source: ByteSource, robot: str) -> CheckedFile | str:
     """Return the judgement of a file by a job, or by the limits of a robot; else why there is none."""
     from trajcli.cli.judged_file import judged_file
     from trajcli.judge.file import CheckOptions

@@ -129,7 +129,7 @@ def peaks_between(
     parts = np.cumsum(np.minimum(counts, _PARTS)[owner])
     blocks = np.split(cut, np.flatnonzero(np.diff(parts // _PARTS)) + 1)
     found = zip(*(_peaks_of(curve, block, orders) for block in blocks), strict=True)
-    return IntervalPeaks(tuple(_of_owners(_joined(of_order), owner) for of_order in found))
+    return IntervalPeaks(tuple(_of_owners(_concatenated(of_order), owner) for of_order in found))
 
 
 def _cut(
@@ -170,7 +170,7 @@ def _of_owners(cuts: Peaks, owner: NDArray[np.intp]) -> Peaks:
     return Peaks(low, low_time, high, high_time)
 
 
-def _joined(parts: Sequence[Peaks]) -> Peaks:
+def _concatenated(parts: Sequence[Peaks]) -> Peaks:
     names = ("low", "low_time", "high", "high_time")
     low, low_time, high, high_time = (np.concatenate([getattr(p, name) for p in parts]) for name in names)
     return Peaks(low, low_time, high, high_time)

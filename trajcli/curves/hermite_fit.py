@@ -107,12 +107,12 @@ def fit(
     done: list[_Pieces] = []
     count = 0
     for _ in range(_ROUNDS):
-        judged = _judged(exact, misfit, pending)
+        judged = _with_misfits(exact, misfit, pending)
         fine = judged.error <= _FILLED
         done.append(judged.pieces.at(fine))
         count += int(np.count_nonzero(fine))
         if fine.all():
-            return _joined(done)
+            return _curve_of(done)
         pieces = count + int(np.count_nonzero(~fine))
         parts = _parts(judged.error[~fine], judged.least[~fine], _AT_ONCE // pieces)
         if count + int(parts.sum()) > at_most:
@@ -194,7 +194,7 @@ def _whole(exact: ExactValues[K], breaks: Array, guess: Guess) -> _Pending:
     return _Pending(pieces, np.arange(breaks.size - 1), np.arange(0), near)
 
 
-def _judged(exact: ExactValues[K], misfit: ErrorMeasure[K], pending: _Pending) -> _Judged:
+def _with_misfits(exact: ExactValues[K], misfit: ErrorMeasure[K], pending: _Pending) -> _Judged:
     """Return the pieces with their misfits; ends and probes are asked for at once: a question costs more."""
     pieces, inner = pending.pieces, pending.lefts.size
     probes = pieces.probes()
@@ -263,7 +263,7 @@ def _divided(pieces: _Pieces, parts: RowIndices, nearer: NDArray[np.bool_], gues
     return _Pending(divided, lefts, lefts - 1, near)
 
 
-def _joined(pieces: list[_Pieces]) -> PiecewisePolynomial:
+def _curve_of(pieces: list[_Pieces]) -> PiecewisePolynomial:
     start = np.concatenate([some.start for some in pieces])
     order = np.argsort(start)
     coefficients = np.concatenate([some.coefficients() for some in pieces], axis=1)[:, order]

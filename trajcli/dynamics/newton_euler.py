@@ -291,7 +291,9 @@ def dynamic_links(robot: Robot) -> tuple[DynamicLink, ...]:
             loads = (load for load in (robot.tool_load, robot.payload) if load is not None)
             solids += [(load.mass, load.com, load.inertia, behind @ robot.tool) for load in loads]
         screw = before if robot.convention == "standard" else link.before
-        result.append(DynamicLink(link.prismatic, link.sign, link.theta, link.d, screw, _joined(solids)))
+        result.append(
+            DynamicLink(link.prismatic, link.sign, link.theta, link.d, screw, _composite_solid(solids))
+        )
         before = link.after
     return tuple(result)
 
@@ -306,7 +308,7 @@ def _screw_matrix(screw: Sequence[float]) -> Array:
     return pose
 
 
-def _joined(solids: Sequence[tuple[float, Array, Array, Array]]) -> RigidSolid:
+def _composite_solid(solids: Sequence[tuple[float, Array, Array, Array]]) -> RigidSolid:
     """Return one solid of several, each by mass, centre, tensor and the pose of the frame they are in."""
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))
     for each, com, tensor, pose in solids:

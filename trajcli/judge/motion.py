@@ -88,12 +88,12 @@ def judge_motion(blocks: Callable[[], Iterable[RecordedMotion]], requirements: R
             or not the columns that the interpolation takes.
     """
     try:
-        return _judged(blocks(), MotionJudge(requirements))
+        return _judgement_of(blocks(), MotionJudge(requirements))
     except UnfitError:
-        return _judged(blocks(), MotionJudge(requirements, snap=False))
+        return _judgement_of(blocks(), MotionJudge(requirements, snap=False))
 
 
-def _judged(blocks: Iterable[RecordedMotion], judge: MotionJudge) -> Judgement:
+def _judgement_of(blocks: Iterable[RecordedMotion], judge: MotionJudge) -> Judgement:
     for block in blocks:
         judge.see(block)
     return judge.judgement()
@@ -159,7 +159,7 @@ class MotionJudge:
             self._waiting.append(block)
             if self._count < _FIRST_ROWS:
                 return
-            block = _joined(self._waiting)
+            block = _one_block(self._waiting)
             self._begin(block)
         self._see(block)
         if self._kept is not None:
@@ -182,7 +182,7 @@ class MotionJudge:
             InputError: When there are fewer than two.
         """
         if self._stamps is None and self._waiting:
-            block = _joined(self._waiting)
+            block = _one_block(self._waiting)
             self._begin(block)
             self._see(block)
         kept, stamps = self._kept, self._stamps
@@ -328,7 +328,7 @@ class MotionJudge:
         return findings + judge_end(state, required.end, required.start_tolerance, resolution, self._axes)
 
 
-def _joined(blocks: list[RecordedMotion]) -> RecordedMotion:
+def _one_block(blocks: list[RecordedMotion]) -> RecordedMotion:
     if len(blocks) == 1:
         return blocks[0]
     names = ("t", "q", "qd", "qdd", "move")

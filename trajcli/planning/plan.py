@@ -142,7 +142,7 @@ def plan_job(
     hint = _unit_hint(loaded) if loaded.has_far_angle else None
     if hint is not None:
         events.append(Event("units", hint))
-    trajectory = _joined(moves, loaded, _first_state(loaded, _first_moving(moves), events), flyby)
+    trajectory = _trajectory_of(moves, loaded, _first_state(loaded, _first_moving(moves), events), flyby)
     if loaded.job.has_signals:
         from trajcli.planning.signals import signals_of
 
@@ -395,7 +395,9 @@ def _first_state(loaded: LoadedJob, first: PlannedMove, events: list[Event]) -> 
     return begins
 
 
-def _joined(moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: FlyBy | None) -> Trajectory:
+def _trajectory_of(
+    moves: list[PlannedMove], loaded: LoadedJob, first: State, flyby: FlyBy | None
+) -> Trajectory:
     curve, spans, end = concatenate([move.planned.curve for move in moves]), [], 0.0
     for move in moves:
         start, end = end, float(move.planned.curve.breaks[-1] + end)

@@ -172,7 +172,13 @@ def calibration_report(calibration: Calibration) -> dict[str, Any]:
         "robot": calibration.arm.robot.name,
         "measurements": len(calibration.measurements.joints),
         "parameters": [
-            {**_named(parameter), "unit": _unit(parameter), "nominal": old, "value": new, "std": deviation}
+            {
+                **_parameter_entry(parameter),
+                "unit": _unit(parameter),
+                "nominal": old,
+                "value": new,
+                "std": deviation,
+            }
             for parameter, old, new, deviation in rows
         ],
         "rank": fit.nominal.rank,
@@ -188,7 +194,11 @@ def calibration_report(calibration: Calibration) -> dict[str, Any]:
         "scale": options.length,
         "noise": dict(zip(("position", "angle"), known.noise, strict=True)),
         "correlations": [
-            {"first": _named(pair.first), "second": _named(pair.second), "value": pair.value}
+            {
+                "first": _parameter_entry(pair.first),
+                "second": _parameter_entry(pair.second),
+                "value": pair.value,
+            }
             for pair in known.correlations
         ],
         "remarks": list(calibration.remarks),
@@ -223,10 +233,10 @@ def _combinations(seen: Identifiability) -> list[list[dict[str, Any]]]:
 
 
 def _share(share: Share) -> dict[str, Any]:
-    return {**_named(share.parameter), "weight": share.weight}
+    return {**_parameter_entry(share.parameter), "weight": share.weight}
 
 
-def _named(parameter: ArmParameter) -> dict[str, Any]:
+def _parameter_entry(parameter: ArmParameter) -> dict[str, Any]:
     return {"joint": parameter.owner, "name": parameter.name}
 
 

@@ -54,7 +54,7 @@ def find_answers(
         PlanningError: When every joint is pinned.
     """
     solutions = solve_pinned(arm.robot, wanted.target, wanted.pins, near, tolerance)
-    names = _named(wanted.configuration)
+    names = _branch_names(wanted.configuration)
     for choice in names:
         if getattr(solutions.names[0], choice) is None:
             raise InputError(
@@ -66,7 +66,7 @@ def find_answers(
     return solutions, chosen if flags is None else chosen & flags.met(arm.robot, solutions.joints)
 
 
-def _named(configuration: Configuration | None) -> dict[str, str]:
+def _branch_names(configuration: Configuration | None) -> dict[str, str]:
     return {} if configuration is None else configuration.branch_names
 
 
@@ -128,7 +128,7 @@ def require_answer(arm: ArmInUnits, solutions: Solutions, chosen: Flags, wanted:
     """
     if (chosen & solutions.within_limits).any():
         return
-    named = " ".join(_named(wanted.configuration).values())
+    named = " ".join(_branch_names(wanted.configuration).values())
     if solutions.valid.any() and named:
         others = [
             str(name) for name, fine in zip(solutions.names, solutions.within_limits, strict=True) if fine

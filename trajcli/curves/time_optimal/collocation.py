@@ -102,7 +102,7 @@ def interval_rows(grid: Array, constraints: Sequence[PathConstraint], stops: Arr
     """
     at_ends = [_at_ends(constraint, grid) for constraint in constraints]
     near_rows, far_rows = zip(*at_ends, strict=True)
-    near, far, D = _joined(near_rows), _joined(far_rows), np.diff(grid)
+    near, far, D = _coefficients_of(near_rows), _coefficients_of(far_rows), np.diff(grid)
     cap, turns = (np.append(each, np.inf) for each in (_cap(near_rows), _turning_cap(near, D)))
     cap[1:] = np.minimum(cap[1:], _cap(far_rows))
     turns[1:] = np.minimum(turns[1:], _turning_cap(far, D))
@@ -243,7 +243,7 @@ def _turning_cap(rows: tuple[Array, Array, Array], D: Array) -> Array:
     return np.asarray(bounds.min(axis=0, initial=np.inf))
 
 
-def _joined(all_rows: Sequence[ConstraintRows]) -> tuple[Array, Array, Array]:
+def _coefficients_of(all_rows: Sequence[ConstraintRows]) -> tuple[Array, Array, Array]:
     """Return a, b and c of all rows, each of shape (k, N)."""
     a, b, c = (np.concatenate([getattr(rows, name).T for rows in all_rows]) for name in "abc")
     return a, b, c

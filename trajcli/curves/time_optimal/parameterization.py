@@ -288,10 +288,10 @@ class GridSolution:
         changed = (rows.C != old.C).any(axis=0) | lower[1:] | lower[:-1]
         mvc = maximum_velocity_curve(rows, self.speeds.mvc, changed)
         speeds = solve_locally(rows, self.speeds, changed, mvc) if changed.mean() < _FEW_CHANGED else None
-        return _judged(problem, rows, speeds or solve(rows, *problem.ends, mvc), self.even | even, self)
+        return _with_excess(problem, rows, speeds or solve(rows, *problem.ends, mvc), self.even | even, self)
 
 
-def _judged(
+def _with_excess(
     problem: PathProblem,
     rows: IntervalRows,
     speeds: Speeds,
@@ -332,7 +332,7 @@ def _solution_on_grid(problem: PathProblem, grid: Array, before: GridSolution | 
     still = np.flatnonzero(np.maximum(speeds.x[1:], speeds.x[:-1]) <= 0.0)
     if still.size:
         raise StandstillError(float(grid[still[0]]))
-    return _judged(problem, rows, speeds, np.zeros(grid.size - 1, dtype=bool), before)
+    return _with_excess(problem, rows, speeds, np.zeros(grid.size - 1, dtype=bool), before)
 
 
 def _refined_solution(problem: PathProblem) -> tuple[GridSolution, int, float]:

@@ -102,7 +102,7 @@ def expanded(document: Document, units: Units) -> ExpandedDocument:
     return _Expansion(document, names, Parts(names, document.node(("defaults",)), context)).document()
 
 
-def _joined(*words: str) -> str:
+def _phrase(*words: str) -> str:
     return ", ".join(word for word in words if word)
 
 
@@ -261,12 +261,12 @@ class _Expansion:
                 for number in range(count):
                     now = {**rounds, **dict.fromkeys(names, number)}
                     said = self._names.words(now, names) or f"round {number + 1} of {count}"
-                    said = _joined(words, label, said)
+                    said = _phrase(words, label, said)
                     yield from self._entries(keys["moves"], (*here, "moves"), now, said)
             elif "call" in keys:
                 name = str(keys["call"].value)
                 at = ("sequences", name)
-                yield from self._entries(self._sequences[name], at, rounds, _joined(words, label))
+                yield from self._entries(self._sequences[name], at, rounds, _phrase(words, label))
             else:
                 for part in self._parts.of(entry, here):
                     yield _Entry(self._of_round(part.node, rounds), here, words, part.places)

@@ -52,7 +52,7 @@ def in_units(part: Part, units: Units) -> Part:
         if name in measured:
             changes[name] = _converted(value, getattr(part, measured[name]), units)
         elif name in measured.values():
-            changes[name] = _named(value, units)
+            changes[name] = _unit_symbols(value, units)
         elif isinstance(value, ReportPart):
             changes[name] = in_units(value, units)
         elif isinstance(value, list | tuple) and value and isinstance(value[0], ReportPart):
@@ -80,7 +80,7 @@ def _converted(value: Any, unit: str | list[str], units: Units) -> Any:  # noqa:
     return None if value is None else value / _in_job(str(unit), units.angle, units.length)[0]
 
 
-def _named(unit: str | list[str], units: Units) -> str | list[str]:
+def _unit_symbols(unit: str | list[str], units: Units) -> str | list[str]:
     names = [_in_job(each, units.angle, units.length)[1] for each in _each(unit, 1)]
     return names[0] if isinstance(unit, str) else names
 

@@ -103,14 +103,14 @@ def parse_parameters(robot: Robot, text: str) -> tuple[ArmParameter, ...]:
     """
     chosen: list[ArmParameter] = []
     for word in (part.strip() for part in text.split(",")):
-        for parameter in _named(robot, word):
+        for parameter in _parameters_of(robot, word):
             if parameter in chosen:
                 raise InputError(f"--free: {parameter} stands twice", hint="name it once")
             chosen.append(parameter)
     return tuple(sorted(chosen, key=lambda parameter: _order(robot, parameter)))
 
 
-def _named(robot: Robot, word: str) -> tuple[ArmParameter, ...]:
+def _parameters_of(robot: Robot, word: str) -> tuple[ArmParameter, ...]:
     names = robot.joint_names
     if word in ("all", "dh"):
         listed = all_parameters(robot)

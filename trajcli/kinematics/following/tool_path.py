@@ -70,7 +70,7 @@ class ToolReference:
 
     def rates(self) -> Array:
         """Return the rates (N, m) that the rows of `residual_jacobian` must have."""
-        return self._joined(self.first[:, :3], self._turning_rates())
+        return self._six_rates(self.first[:, :3], self._turning_rates())
 
     def accelerations(self, poses: Array, bias: Array, twist: Array) -> Array:
         """Return what the rows of `residual_jacobian`, times qdd, must be, shape (N, m).
@@ -82,15 +82,15 @@ class ToolReference:
         """
         linear = self.second[:, :3] - bias[:, :3]
         if self.orientation in ("all", "none"):
-            return self._joined(linear, self.second[:, 3:] - bias[:, 3:])
+            return self._six_rates(linear, self.second[:, 3:] - bias[:, 3:])
         spin = twist[:, 3:]
         axis = poses[:, :3, AXES.index(self.tool_axis)]
         axis_rate = np.cross(spin, axis)
         drift = np.cross(bias[:, 3:], axis) + np.cross(spin, axis_rate)  # of the axis' second derivative
         if self.orientation == "direction":
             wanted = self._axis_acceleration()
-            return self._joined(linear, np.cross(axis, wanted - drift))
-        return self._joined(linear, self._angle_acceleration(axis, axis_rate, drift)[:, None])
+            return self._six_rates(linear, np.cross(axis, wanted - drift))
+        return self._six_rates(linear, self._angle_acceleration(axis, axis_rate, drift)[:, None])
 
     def _angle_acceleration(self, axis: Array, axis_rate: Array, drift: Array) -> Array:
         """Return what is left of the second derivative of yaw or pitch, shape (N,)."""
@@ -116,7 +116,7 @@ class ToolReference:
         axis, spin = self.poses[:, :3, AXES.index(self.tool_axis)], self.first[:, 3:]
         return np.asarray(np.cross(self.second[:, 3:], axis) + np.cross(spin, np.cross(spin, axis)))
 
-    def _joined(self, linear: Array, turning: Array) -> Array:
+    def _six_rates(self, linear: Array, turning: Array) -> Array:
         parts = [linear[:, list(self.position)]]
         return np.concatenate(parts if self.orientation == "none" else [*parts, turning], axis=1)
 

@@ -109,11 +109,11 @@ class JoinedRows:
                 judge_limits(run)
             if tool is not None:
                 self._see_tool(tool, window)
-            if first_only and self._judged(begun, worst, tool, slack).findings:
+            if first_only and self._judgement(begun, worst, tool, slack).findings:
                 break
-        return self._judged(begun, worst, tool, slack)
+        return self._judgement(begun, worst, tool, slack)
 
-    def _judged(
+    def _judgement(
         self, begun: Judgement, worst: _Collectors, tool: ToolJudge | None, slack: float
     ) -> Judgement:
         """Return the judgement with what was found."""

@@ -475,7 +475,7 @@ def law_along(
         length = high - low
         share = None if spec.duration is None else spec.duration * length / path.length
         segments.append(spec.time_law.segment(spec, length, bounds, share))
-    return _joined(lasting_at_least(spec.minimum_duration, segments), stops), ruled_by
+    return _one_segment(lasting_at_least(spec.minimum_duration, segments), stops), ruled_by
 
 
 def lasting_at_least(duration: float | None, segments: list[LawSegment]) -> list[LawSegment]:
@@ -486,7 +486,7 @@ def lasting_at_least(duration: float | None, segments: list[LawSegment]) -> list
     return [segment.scaled(duration / total) for segment in segments]
 
 
-def _joined(segments: list[LawSegment], stops: Array) -> LawSegment:
+def _one_segment(segments: list[LawSegment], stops: Array) -> LawSegment:
     laws, breaks, phases, begin = [], [np.zeros(1)], list[Phase](), 0.0
     for segment, s in zip(segments, stops[:-1], strict=True):
         coefficients = segment.law.coefficients.copy()

@@ -135,7 +135,7 @@ def read_name(text: str) -> ColumnName:
         ends = not plain[at.end() :].strip(" _.])}")
         stem = plain[: at.start()].rstrip(" _.[({") if ends else f"{plain[: at.start()]}*{plain[at.end() :]}"
         return ColumnName(text, quantity, None if quantity is None else int(at[0]), unit, kind, stem)
-    return _named(ColumnName(text, quantity, None, unit, kind, plain), letters)
+    return _with_joint_name(ColumnName(text, quantity, None, unit, kind, plain), letters)
 
 
 def split_unit(text: str) -> tuple[str, str | None]:
@@ -183,7 +183,7 @@ def _quantity(words: Sequence[str]) -> tuple[str | None, list[str]]:
     return _WORDS[words[best]], [word for index, word in enumerate(words) if index != best]
 
 
-def _named(read: ColumnName, letters: Sequence[str]) -> ColumnName:
+def _with_joint_name(read: ColumnName, letters: Sequence[str]) -> ColumnName:
     """Return what a name with the name of a joint says: `elbow_position`, `velocity/elbow`, `elbow_joint`."""
     plain = read.stem
     if read.quantity is None and letters and letters[-1] in _JOINT_WORDS:

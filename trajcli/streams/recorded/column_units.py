@@ -172,7 +172,7 @@ class _Unit:
     def factor(self, said: SaidUnits, plain: Units | None, declared: Units | None) -> float | None:
         """Return SI per unit of the column; None where nothing says the unit."""
         if self.name.unit is not None:
-            return self._named(self.name.unit)
+            return self._factor_of(self.name.unit)
         if self.quantity == "tau":
             return 1.0
         measured = Quantity(self.dimension, self.order)
@@ -182,7 +182,7 @@ class _Unit:
         units = plain or declared
         return None if units is None else factor(measured, units)
 
-    def _named(self, unit: str) -> float:
+    def _factor_of(self, unit: str) -> float:
         """Return the factor of a unit that the column names."""
         if self.quantity == "tau":
             if unit != "Nm":
