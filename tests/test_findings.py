@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from trajcli.errors import Amount, Place
-from trajcli.findings import Collector, Finding, excess_amounts
+from trajcli.findings import Collector, Finding, at_time, excess_amounts, tool_excess_amounts
 
 GROUPS = (("error", "exceeded"), ("error", "within rounding"), ("warning", "exceeded"))
 
@@ -103,6 +104,12 @@ def test_a_message_in_other_units_keeps_the_unit_of_the_numbers() -> None:
     assert (said.text(), said.si_unit, said.value) == ("1000 mm/s", "m/s", 1.0)
 
 
+def test_a_joint_may_have_a_name_that_looks_like_an_amount() -> None:
+    amounts = {"value": Amount(1.0, 1, 0, "angle"), "joint": "{value}"}
+    wrong = Finding("velocity", "{value}", 1.0, 0.5, message="{joint}: {value}", amounts=amounts)
+    assert wrong.text() == wrong.said_by(str).text() == "{value}: 1 rad/s"
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_of_all_moves_together_the_worst_of_each_certainty_is_kept(seed: int) -> None:
     """Blocks are moves: of each joint and each certainty the worst one, counted in the move in which it is."""
@@ -149,20 +156,48 @@ def test_all_moves_of_one_block_have_one_worst(sizes: list[float], worst: tuple[
 )
 def test_how_bad_a_finding_is_has_no_sign(value: float | None, limit: float, excess: float) -> None:
     assert Finding("velocity", "j1", value, limit, 0.0).excess == excess
-    assert Finding("jump", "j1", value, limit, 0.0).excess == np.inf  # a jump has no ratio to what it may be
+    for kind in ("jump", "time", "derivative"):  # of these there is no ratio to what they may be
+        assert Finding(kind, "j1", value, limit, 0.0).excess == np.inf
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_value_beyond_its_limit_is_printed_beyond_it(side: int, sign: int) -> None:
-    """Six digits make one number of both: they are rounded away from each other."""
-    limit = sign * 1.2345678
-    value = limit + side * 1e-9
+    """Nine digits make one number of both: they are rounded away from each other."""
+    limit = sign * 1.23456789012
+    value = limit + side * 1e-11
     amounts = excess_amounts(Arm, 1, 1, value, limit)
     printed = [float(str(amounts[name]).split()[0]) for name in ("value", "limit")]
     assert np.sign(printed[0] - printed[1]) == side
     assert side * (printed[0] - value) >= 0 >= side * (printed[1] - limit)
-    assert (amounts["joint"], amounts["value"].dimension) == ("b", "length")
+    for name in ("value", "limit"):
+        amount = amounts[name]
+        assert (amounts["joint"], amount.order, amount.joint, amount.dimension) == ("b", 1, 1, "length")
+
+
+@pytest.mark.parametrize(("dimension", "unit"), [("length", "m"), ("angle", "rad")])
+@pytest.mark.parametrize(("order", "rate"), [(0, ""), (1, "/s"), (2, "/s^2"), (3, "/s^3")])
+def test_a_value_of_the_tool_is_printed_beyond_its_limit_in_its_unit(
+    order: int, rate: str, dimension: Literal["length", "angle"], unit: str
+) -> None:
+    limit = 1.23456789012
+    amounts = tool_excess_amounts(limit + 1e-11, limit, order, dimension)
+    assert [str(amounts[name]) for name in ("value", "limit")] == [
+        f"1.2345679 {unit}{rate}",
+        f"1.23456789 {unit}{rate}",
+    ]
+    assert Finding("tool_speed", value=2.0, limit=1.0, amounts=amounts).si_unit == unit + rate
+
+
+def test_a_time_is_told_in_seconds_to_the_nanosecond() -> None:
+    assert at_time(1.23456789) == "at t = 1.23456789 s"
+
+
+@pytest.mark.parametrize("more", [1e-9, 1e-7])
+def test_what_differs_by_more_than_rounding_is_worse(more: float) -> None:
+    found = Collector()
+    found.add("velocity", 0, np.array([0, 0]), np.array([2.0, 2.0 * (1 + more)]), finding)
+    assert [f.row for f in found.findings()] == [1]
 
 
 class Arm:
@@ -178,3 +213,22 @@ def test_a_state_that_is_missed_comes_before_limits_that_are_passed(kind: str) -
     missed = [Finding(kind=kind, value=value, limit=0.009) for value in (0.0, 0.02)]
     passed = Finding(kind="velocity", value=1.1, limit=1.0)
     assert all(finding.excess > passed.excess for finding in missed)
+
+
+@pytest.mark.parametrize("by_move", [True, False])
+def test_findings_of_many_moves_are_made_at_once_and_one_of_all_moves_when_it_is_asked_for(
+    *, by_move: bool
+) -> None:
+    """Rows of the one may go, or be written over; of the other only the worst is made, though each is worse."""
+    found, rows, made = Collector(by_move=by_move), np.zeros(1, dtype=int), list[int]()
+
+    def make(_: int) -> Finding:
+        made.append(int(rows[0]))
+        return finding(int(rows[0]))
+
+    for row in range(5):
+        rows[0] = row
+        found.add("velocity", row, np.array([0]), np.array([1.0 + row]), make)
+    rows[0] = 99
+    assert made == (list(range(5)) if by_move else [])
+    assert [each.row for each in found.findings()] == (list(range(5)) if by_move else [99])

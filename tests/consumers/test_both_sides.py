@@ -252,6 +252,17 @@ def test_blocks_without_rows_change_nothing(profile: str) -> None:
     assert cut == [whole]
 
 
+def test_stamps_that_are_too_late_are_one_fault_of_the_whole_file_in_whatever_blocks_it_comes() -> None:
+    """It begins within a move, and goes on in the next; blocks end elsewhere."""
+    rows = motion(6, 0.1, 21)
+    late = replace(
+        rows, t=np.where(np.arange(21) < 10, rows.t, rows.t + 2147.0), move=np.repeat([0, 1, 2], 7)
+    )
+    found = judged(late, "ur-passthrough").findings
+    told = [each for each in found if each.rule == "passthrough-longest"]
+    assert [(each.row, each.count, each.value, each.move) for each in told] == [(11, 11, late.t[-1], None)]
+
+
 @pytest.mark.parametrize("order", [1, -1])
 def test_findings_are_told_errors_first_and_by_their_times(order: int) -> None:
     """Whichever rule stands first: it counts where two are broken at one time alone."""

@@ -193,8 +193,13 @@ def test_the_remainder_covers_a_peak_that_no_row_shows(length, monkeypatch):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_first_look_knows_of_a_peak_that_no_row_shows(sign):
-    survey = effort_survey(lift(gravity=0.0), np.array([0.0, 1.0]), sign * hidden_motion(1e-8, 1.0))
+@pytest.mark.parametrize("beside", [None, 0, 1])
+def test_a_first_look_knows_of_a_peak_that_no_row_shows(sign, beside):
+    """Alone, behind a piece that rests, or before it: what is known of one piece exactly is not known of another."""
+    motion = sign * hidden_motion(1e-8, 1.0)
+    if beside is not None:
+        motion = np.insert(motion, beside, 0.0, axis=1)
+    survey = effort_survey(lift(gravity=0.0), np.arange(motion.shape[1] + 1.0), motion)
     limit = 5.0 * (1.0 + 0.9e-8)
     found = list(survey.doubtful(np.array([[-limit, limit]]), 1e-10))
     assert found == [(0, sign, limit)]
@@ -233,6 +238,56 @@ def test_coulomb_friction_jumps_where_a_joint_turns_back():
     assert low.upper_bound == pytest.approx(-2.0 * 11.81 + 3.0)
     assert high.time == pytest.approx(0.5, abs=1e-9) or high.time > 0.5
     assert high.parts == pytest.approx((4.0, 0.0, 3.0, 19.62))
+
+
+def test_coulomb_friction_jumps_where_a_joint_turns_back_and_back_again():
+    """m qdd + c sign(qd), by hand, of qd = (t - 0.3) (t - 0.7): it leaves a piece as it came."""
+    coefficients = np.polyint(np.poly([0.3, 0.7]))[:, None, None]
+    survey = effort_survey(lift(2.0, Friction(coulomb=3.0), 0.0), np.array([0.0, 1.0]), coefficients)
+    assert survey.highest()[0].upper_bound == pytest.approx(2.0 + 3.0)
+    assert survey.lowest()[0].upper_bound == pytest.approx(0.8 + 3.0)
+
+
+@pytest.mark.parametrize("turn", [1e-7, 1e-9])
+def test_a_joint_that_turns_back_just_behind_its_start_rubs_either_way(turn):
+    """It begins with 1e-3 m/s, and has turned after a small part of its piece: m qdd - c, then m qdd + c."""
+    coefficients = np.array([0.5e-3 / turn, -1e-3, 0.0])[:, None, None]
+    survey = effort_survey(lift(2.0, Friction(coulomb=3e4), 0.0), np.array([0.0, 1.0]), coefficients)
+    assert survey.highest()[0].upper_bound == pytest.approx(2e-3 / turn + 3e4)
+    assert survey.lowest()[0].upper_bound == pytest.approx(3e4 - 2e-3 / turn)
+
+
+def test_a_joint_that_is_never_faster_than_what_counts_as_rest_does_not_turn():
+    coefficients = np.array([1e-3, -0.8e-3, 0.0])[:, None, None]  # qd = 2e-3 (t - 0.4), qdd = 2e-3
+    for still, lowest in ((1e-2, -3.004), (1e-6, 2.996)):
+        survey = effort_survey(
+            lift(2.0, Friction(coulomb=3.0), 0.0), np.array([0.0, 1.0]), coefficients, still=still
+        )
+        assert survey.lowest()[0].upper_bound == pytest.approx(lowest)
+
+
+def test_a_short_piece_counts():
+    pieces = np.zeros((3, 3, 1))
+    pieces[0, 1] = 25.0  # 50 m/s^2 for a tenth of a millisecond
+    survey = effort_survey(lift(), np.array([0.0, 1.0, 1.0001, 2.0]), pieces)
+    assert survey.highest()[0].upper_bound == pytest.approx(5.0 * (9.81 + 50.0))
+
+
+def test_bounds_are_as_near_as_the_sum_of_parts_asks_and_not_as_each_of_them():
+    """A lift that falls: of 49 N of gravity and as much of inertia 1 - (t - 0.4317)^2 is left."""
+    joint = np.polyint(np.polyint([-1.0, 2 * 0.4317, 1.0 - 0.4317**2 - 49.05])) / 5.0
+    survey = effort_survey(lift(), np.array([0.0, 1.0]), joint[:, None, None])
+    assert 1.0 <= survey.highest()[0].upper_bound <= 1.0 + 1.5e-7
+
+
+def test_bounds_of_a_joint_are_as_near_as_its_own_efforts_ask():
+    """The first of two slides moves ten thousand tons by 1 m/s^2, the second one 1 kg: it needs 1 - (t - 0.4317)^2."""
+    slides = tuple(replace(lift(mass).robot.joints[0], name=f"{mass} kg") for mass in (1e7, 1.0))
+    robot = Robot("two", slides, unlimited(2), "standard", np.eye(4), np.eye(4))
+    second = np.polyint(np.polyint([-1.0, 2 * 0.4317, -(0.4317**2)]))
+    motion = np.stack([np.array([0.0, 0.0, 0.5, 0.0, 0.0]), second], axis=-1)[:, None]
+    survey = effort_survey(InverseDynamics(robot, np.zeros(3)), np.array([0.0, 1.0]), motion)
+    assert 1.0 <= survey.highest()[1].upper_bound <= 1.0 + 1.5e-7
 
 
 def test_a_motion_of_no_length_asks_for_nothing():
@@ -281,11 +336,25 @@ def test_what_rounding_makes_of_rest_at_either_end_turns_no_joint(reverse):
     assert effort_bound._turns(np.sort(middle), coefficients, 1.0, still).tolist() == [0.5]
 
 
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize(("still", "turns"), [(0.04, True), (0.06, False)])
+def test_a_joint_turns_where_it_is_faster_than_rest_at_the_end_of_its_piece_alone(still, turns, reverse):
+    """At 1 m/s^2 it moves with 0.05 m/s there, and turns 0.05 s from that end."""
+    roots = np.array([0.95 if reverse else 0.05])
+    speed = np.array([1.0, -roots[0]])
+    found = effort_bound._turns(roots, np.polyint(speed), 1.0, still)
+    assert found.tolist() == roots.tolist() * turns
+
+
 @pytest.mark.filterwarnings("error")
 def test_what_no_float_holds_is_not_proven():
     with np.errstate(over="ignore", invalid="ignore"):
         survey = effort_survey(lift(), np.array([0.0, 1.0]), np.full((3, 1, 1), 1e308))
+        doubts = list(survey.doubtful(np.array([[-60.0, 60.0]]), 1e-6))
     assert survey.highest()[0].upper_bound == np.inf
+    assert doubts == [(0, 1, 60.0), (0, -1, 60.0)]
+    once = calls_of(lambda: survey.peak(0, 1))
+    assert calls_of(lambda: needed_stretch(survey, 0, 1, 60.0, 1e-6)) < 2 * once
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -353,6 +422,29 @@ def test_what_is_not_resolved_is_given_up_at_once():
     assert needed_stretch(vague, 0, 1, 60.0, 0.0).factor == np.inf
     once = calls_of(lambda: vague.peak(0, 1))
     assert calls_of(lambda: needed_stretch(vague, 0, 1, 60.0, 0.0)) < 2 * once
+
+
+@pytest.mark.parametrize("off", [0.0, 0.08])
+@pytest.mark.parametrize("above", [1.0001, 1.0015, 1.003])
+def test_a_motion_is_stretched_until_its_bound_is_proven_and_hardly_further(above, off):
+    """m (4 / k^2 + g) + off keeps 1.001 times a limit with the smallest k, in steps of half a thousandth."""
+    survey = effort_survey(lift(), np.array([0.0, 1.0]), np.array([2.0, 0.0, 0.0])[:, None, None])
+    survey = replace(survey, nodes=replace(survey.nodes, remainder=np.full((1, 1), off)))
+    limit, slack = 69.05 / above, 1e-3
+    smallest = max((20.0 / (limit * (1 + slack) - off - 49.05)) ** 0.5, 1.0)
+    found = needed_stretch(survey, 0, 1, limit, slack)
+    assert found.peak.upper_bound <= limit * (1 + slack)
+    assert smallest * (1 - 1e-12) <= found.factor <= max((20.0 / (limit - 49.05)) ** 0.5, smallest) * 1.0006
+
+
+@pytest.mark.parametrize("qdd", [0.0, -0.2])
+def test_no_stretch_makes_a_bound_of_a_static_load_closer(qdd):
+    """What is over the limit is the remainder: a lift that hangs, or falls a little, bears no more when it is slower."""
+    survey = effort_survey(lift(), np.array([0.0, 1.0]), np.array([0.5 * qdd, 0.0, 0.0])[:, None, None])
+    vague = replace(survey, nodes=replace(survey.nodes, remainder=np.full((1, 1), 2.0)))
+    assert needed_stretch(vague, 0, 1, 49.5, 1e-6).factor == np.inf
+    once = calls_of(lambda: vague.peak(0, 1))
+    assert calls_of(lambda: needed_stretch(vague, 0, 1, 49.5, 1e-6)) < 2 * once
 
 
 def test_no_stretch_helps_where_gravity_alone_is_over_the_limit():

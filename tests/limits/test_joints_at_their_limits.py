@@ -109,6 +109,7 @@ def test_a_path_into_the_zone_without_motion_is_refused_with_its_distance(end: f
     (problem,) = caught.value.problems
     distance = problem.amounts["distance"]
     assert isinstance(distance, Amount)
+    assert problem.text().endswith(f"towards its position limit, {distance} from it, where it may not")
     assert 0.0 <= distance.value < OFFSET**2 / (2 * D)
     assert distance.order == 0
 

@@ -144,19 +144,18 @@ class LongestTime(RuleCheck):
 
     def _take(self, rows: RecordedMotion) -> None:
         limit = self.number("limit")
-        over = rows.t > limit
-        if not over.any():
-            return
-        index = int(over.argmax())
         self._latest = max(self._latest, float(rows.t.max()))
-        fields = {
-            "kind": "time",
-            "value": self._latest,
-            "limit": limit,
-            "message": f"the row {when(rows, index)} is the first that lies beyond {limit:g} s",
-            "hint": "split the motion",
-        }
-        self.note(rows, None, index, -float(rows.t[index]), fields, int(over.sum()))
+
+        def fields(index: int) -> dict[str, Any]:
+            return {
+                "kind": "time",
+                "value": self._latest,
+                "limit": limit,
+                "message": f"the row {when(rows, index)} is the first that lies beyond {limit:g} s",
+                "hint": "split the motion",
+            }
+
+        self.note_times(replace(rows, move=None), rows.t > limit, -rows.t, fields)
 
     def findings(self) -> Iterator[Finding]:
         """Yield the first row beyond the limit, with the latest stamp as value."""

@@ -116,7 +116,7 @@ class EffortSurvey:
         weighted = replace(self.nodes, values=self.nodes.values * weights)
         found = weighted.largest(joint, _sum, lambda _: slack)
         dynamic, viscous, coulomb, gravity = found.entries.tolist()
-        time = min(max(found.time, self.span[0]), self.span[1])
+        time = min(found.time, self.span[1])
         return EffortPeak(found.value, time, found.upper_bound, (dynamic, viscous, coulomb, gravity))
 
 
@@ -157,7 +157,7 @@ def needed_stretch(survey: EffortSurvey, joint: int, sign: int, limit: float, sl
             return EffortStretch(factor, peak)
         free = limit - peak.static
         inertial, viscous = peak.parts[0] * factor**2, peak.parts[1] * factor
-        if not 0.0 < free < np.inf or not np.isfinite(peak.value):
+        if not free > 0.0 or not np.isfinite(peak.value):
             break
         if peak.upper_bound - peak.value > 2.0 * limit:
             break  # of a motion that its pieces do not resolve nothing near is known, however slow

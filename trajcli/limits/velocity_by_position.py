@@ -132,7 +132,7 @@ class ApproachFamily(LimitFamily):
                     "distance": Amount(max(use.distance, 0.0), 0, use.component),
                 }
                 hint = "keep further from the limit: velocity_by_position allows no motion towards it so near"
-                raise PlanningError(Problem(message + "not", hint, joint=name, amounts=amounts))
+                raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
         return (ApproachConstraint(path, limits),)
 
 
