@@ -356,3 +356,38 @@ def test_of_joints_that_are_rounded_alike_the_one_with_the_least_jerk_is_named()
     rough = replace(FRANKA.resolution, q=np.full(7, 3e-9))
     (told,) = found(replace(FRANKA, resolution=rough), "franka-fer", "fer-decimals")
     assert (told.joint, told.value) == ("joint_2", pytest.approx(24.0))
+
+
+def straight(period: float, speeds: np.ndarray) -> RecordedMotion:
+    """Return rows of positions alone, between which joint 3 moves at given speeds, rad/s."""
+    q = np.zeros((len(speeds) + 1, 7))
+    q[1:, 2] = np.cumsum(period * speeds)
+    t = period * np.arange(len(speeds) + 1)
+    return replace(motion(period=period, rows=len(t), columns="q", decimals=None), t=t, q=q)
+
+
+@SIDES
+@pytest.mark.parametrize("period", [0.1, 5e-4])
+@pytest.mark.parametrize(("size", "broken"), [(5e-9, True), (5e-10, False)])
+def test_a_step_of_velocity_is_more_than_a_billionth(
+    size: float, period: float, side: float, *, broken: bool
+) -> None:
+    """A joint that moves at one speed for two intervals, and rests before and behind."""
+    rows = straight(period, side * np.array([0.0, size, size, 0.0]))
+    told = found(rows, "ros-jtc", "jtc-positions-only")
+    assert [(each.joint, each.row, each.count) for each in told] == [("joint_3", 2, 2)] * broken
+
+
+def test_points_with_velocities_have_no_steps_of_them() -> None:
+    """They are joined by cubics, whether they have accelerations or not."""
+    around = Surroundings(FRANKA.joints, HOME[7])
+    for columns in ("q,qd", "q,qd,qdd"):
+        assert judged(motion(period=0.1, rows=21, columns=columns), "ros-jtc", around).findings == ()
+
+
+def test_a_stamp_that_repeats_makes_no_velocity_without_bounds() -> None:
+    """The joint goes on while the time stands still: at 0.5, at no speed that is known, at 0.5."""
+    rows = straight(0.1, np.full(6, 0.5))
+    t = np.array([0.0, 0.1, 0.2, 0.2, 0.3, 0.4, 0.5])
+    (told,) = found(replace(rows, t=t), "ros-jtc", "jtc-positions-only")
+    assert (told.value, told.row, told.count) == (pytest.approx(0.5), 1, 4)

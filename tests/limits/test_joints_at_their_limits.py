@@ -101,6 +101,20 @@ def test_a_finding_says_on_which_side_of_the_end_the_joint_is(distance: float, w
     assert finding.amounts["distance"] == Amount(0.1, 0, 0, dimension="angle")
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    ("limit", "rule"), [(1.0, "where its limit is"), (0.0, "where it may not move towards it")]
+)
+def test_a_finding_says_what_a_joint_may_do_in_the_direction_in_which_it_moves(
+    limit: float, rule: str, sign: int
+) -> None:
+    use = dataclasses.replace(too_fast(), velocity=sign * 1.5, limit=sign * limit)
+    finding = velocity_by_position.approach_excess(one_joint(of_position()), use)
+    assert rule in finding.message
+    told = (finding.value, finding.limit, finding.amounts["value"].value, finding.amounts["limit"].value)
+    assert told == (sign * 1.5, sign * limit, sign * 1.5, sign * limit)
+
+
 @pytest.mark.parametrize("end", [END + 0.02, END - 0.001])
 def test_a_path_into_the_zone_without_motion_is_refused_with_its_distance(end: float) -> None:
     path = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[1.0]], [[end - 1.0]]]))
@@ -219,10 +233,10 @@ def test_each_joint_that_is_too_fast_near_its_end_counts(worst: int) -> None:
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("joint", range(2))
 def test_a_path_is_refused_for_the_joint_that_may_not_move_at_either_end(joint: int, sign: int) -> None:
-    """Nearer than o^2 / (2 d) = 0.0075 to its end; further away it may, towards either end."""
+    """Nearer than o^2 / (2 d) = 0.0075 to its end; further away it may, towards either end, if slowly."""
     bounds = Limits(*(np.tile(each, (2, 1)) for each in (np.array([[-END, END]]), *[UNLIMITED] * 3)))
     arm = several(2, dataclasses.replace(bounds, velocity_by_position=np.tile([D, OFFSET], (2, 1))))
-    for near, refused in ((0.005, True), (0.01, False)):
+    for near, refused in ((0.005, True), ((OFFSET + 1e-6) ** 2 / (2 * D), False), (0.01, False)):
         moved = np.full(2, 0.1)
         moved[joint] = sign * (END - near)
         path = PiecewisePolynomial(np.array([0.0, 1.0]), np.stack([moved[None], np.zeros((1, 2))]))
@@ -232,8 +246,11 @@ def test_a_path_is_refused_for_the_joint_that_may_not_move_at_either_end(joint: 
         with pytest.raises(PlanningError) as caught:
             velocity_by_position.FAMILY.path_constraints(path, arm)
         (problem,) = caught.value.problems
-        assert problem.joint == f"j{joint}"
+        assert problem.joint == problem.amounts["joint"] == f"j{joint}"
         assert problem.amounts["distance"].value == pytest.approx(near, abs=1e-9)
+        assert problem.amounts["distance"].joint == joint
+        resting = PiecewisePolynomial(path.breaks, np.stack([np.eye(2)[None, 1 - joint], moved[None]]))
+        assert len(velocity_by_position.FAMILY.path_constraints(resting, arm)) == 1  # it stays where it is
 
 
 @pytest.mark.parametrize(("position", "limit"), [(0.2, 0.5), (-0.2, 0.5), (2.2, 2.0)])
@@ -263,6 +280,8 @@ def test_a_move_of_no_duration_has_no_acceleration_and_no_factor(
     found = list(survey.over(whole))
     assert {each.kind for each in found} == kinds
     assert all((each.factor is None) is (begins == ends) for each in found)
+    near = velocity_by_position.FAMILY.survey(LimitedMove(whole, span, of_position()))
+    assert len(near.uses) == (begins < ends)
 
 
 @pytest.mark.parametrize("side", [1, -1])

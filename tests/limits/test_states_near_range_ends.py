@@ -35,7 +35,7 @@ REST = State(np.zeros(3), np.zeros(3), np.zeros(3))
 
 @pytest.mark.parametrize("joint", range(3))
 @pytest.mark.parametrize("upper", [True, False])
-@pytest.mark.parametrize(("share", "over"), [(1.0001, True), (0.9999, False), (-1.5, False)])
+@pytest.mark.parametrize(("share", "over"), [(1 + 1e-8, True), (1 - 1e-8, False), (-1.5, False)])
 def test_a_state_is_over_where_it_moves_too_fast_towards_an_end(joint, upper, share, over):
     arm, fast, use = robot(joint), state(joint, upper, share), ("velocity_by_position", joint, 0.0)
     assert FAMILY.over_at_ends(arm, [fast, REST], use) is over

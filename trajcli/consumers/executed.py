@@ -183,7 +183,7 @@ def _approach(rows: RecordedMotion, start: Array) -> PiecewisePolynomial:
     """Return the curve from rest at `start` to the first of the rows."""
     time, change = float(rows.t[0]), rows.q[0] - start
     end = [change]
-    for values in (rows.qd, rows.qdd)[: 1 if rows.qd is not None and rows.qdd is None else 2]:
+    for values in (rows.qd, rows.qdd):
         if values is None:
             break
         end.append(values[0])

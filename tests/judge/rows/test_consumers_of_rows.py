@@ -79,6 +79,13 @@ def test_rows_at_no_rate_are_tried_once(tmp_path: Path) -> None:
     assert all(tried == [None] for tried in rates.values())
 
 
+@pytest.mark.parametrize("second", [0.0, -0.1, 1e-9])
+@pytest.mark.parametrize("count", [1, 3])
+def test_stamps_that_repeat_or_go_back_have_no_rate(count: int, second: float, tmp_path: Path) -> None:
+    rates = found(tmp_path, np.append(second * np.arange(count + 1), 0.6))
+    assert rates["ros-jtc"] == [None]
+
+
 @pytest.mark.parametrize(
     ("lasting", "any_one"), [(0.999, False), (1.0, False), (1.001, True), (2.0, True), (2.001, False)]
 )

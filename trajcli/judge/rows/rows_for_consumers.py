@@ -153,7 +153,7 @@ def _rate_of(t: Array) -> float | None:
         return None
     whole = steps[:-1]
     period = float(whole.mean())
-    if np.ptp(whole) > _SAME_STEPS:
+    if not np.ptp(whole) <= _SAME_STEPS < period:
         return None
     rate = 1.0 / period
     return float(round(rate)) if abs(rate - round(rate)) <= _OF_PERIOD * max(rate, 1.0) else rate
