@@ -34,9 +34,40 @@ def test_numbers_beyond_int32_in_either_direction(name: str, side: float) -> Non
     for beyond in (2147.4837, 2147.4836):
         planted = with_value(rows, name, 10, 1, side * beyond - own)
         broken = found(planted, "ur-passthrough", "passthrough-range")
-        assert [each.value for each in broken] == (
-            [pytest.approx(side * beyond)] if beyond > 2147.48365 else []
+        assert [(each.value, each.limit) for each in broken] == (
+            [(pytest.approx(side * beyond), side * 2147.483647)] if beyond > 2147.48365 else []
         )
+
+
+@SIDES
+def test_of_numbers_beyond_int32_the_largest_is_told_in_whichever_direction(side: float) -> None:
+    """Accelerations are judged where there are no velocities, too."""
+    rows = motion(6, 0.1, 21, columns="q,qdd")
+    assert rows.qdd is not None
+    qdd = rows.qdd.copy()
+    qdd[7, 3], qdd[12, 3] = -side * 3000.0, side * 2500.0
+    (told,) = found(replace(rows, qdd=qdd), "ur-passthrough", "passthrough-range")
+    assert (told.kind, told.joint, told.row, told.value) == ("acceleration", "joint_4", 8, -side * 3000.0)
+    assert (told.limit, told.count) == (-side * 2147.483647, 2)
+
+
+@SIDES
+@pytest.mark.parametrize("comes", ["early", "late"])
+@pytest.mark.parametrize(("speed", "broken"), [(24.0, False), (26.0, True)])
+def test_what_stamps_make_of_points_without_velocities_is_that_of_straight_lines(
+    speed: float, side: float, comes: str, *, broken: bool
+) -> None:
+    """All points but the first come 0.4 us early or late, one at 24 or 26 rad/s: 9.6e-6 or 10.4e-6 of 1e-5."""
+    rows = motion(6, 0.1, 21, columns="q")
+    t = 0.1 * np.arange(21)
+    t[1:] += 4e-7 if comes == "early" else -4e-7
+    q = np.zeros((21, 6))
+    q[1:, 2] = side * 0.1 * np.cumsum(np.where(np.arange(20) == 13, speed, 5.0))
+    told = judged(replace(rows, t=t, q=q), "ur-passthrough", Surroundings(rows.joints, q[0])).findings
+    off = [each for each in told if each.rule == "passthrough-quantisation"]
+    assert [(each.joint, each.row, each.count) for each in off] == [("joint_3", 15, 1)] * broken
+    assert [each.value for each in off] == [pytest.approx(speed * 4e-7)] * broken
+    assert all(f"comes 4e-07 s {comes}, and joint_3 is" in each.message for each in off)
 
 
 @SIDES
