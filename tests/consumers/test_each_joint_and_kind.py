@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from planted_faults import HOME, judged, motion, with_value
 
+from trajcli.consumers.executed import approach_excesses
 from trajcli.consumers.judgement import judge_by_profile, load_profile
 from trajcli.consumers.rule_check import Surroundings
 from trajcli.findings import Finding
@@ -422,3 +423,34 @@ def test_a_stamp_that_repeats_makes_no_velocity_without_bounds() -> None:
     t = np.array([0.0, 0.1, 0.2, 0.2, 0.3, 0.4, 0.5])
     (told,) = found(replace(rows, t=t), "ros-jtc", "jtc-positions-only")
     assert (told.value, told.row, told.count) == (pytest.approx(0.5), 1, 4)
+
+
+@SIDES
+@pytest.mark.parametrize("joint", [0, 6])
+def test_a_curve_to_the_first_point_is_told_by_what_it_reaches_and_when(joint: int, side: float) -> None:
+    """From rest to rest a quintic reaches 10 / sqrt(3) D / T^2 at (1 -+ 1 / sqrt(3)) T / 2, and brakes as hard."""
+    span, distance = 0.4, 0.5
+    later = replace(FRANKA, t=FRANKA.t + span)
+    start = STILL[0] - side * distance * np.eye(7)[joint]
+    peak = 10 / 3**0.5 * distance / span**2
+    free = np.tile([-np.inf, np.inf], (7, 1))
+    for low, high in ((0.9, 0.8), (0.9, 1.1), (1.1, 0.8), (1.1, 1.1)):
+        limits = Limits(free, free, np.tile([-low * peak, high * peak], (7, 1)), free)
+        told = sorted(approach_excesses(later, start, limits), key=lambda each: each[2])
+        speeding, braking = ((1 - side * way / 3**0.5) * span / 2 for way in (1, -1))
+        wanted = [(joint, "acceleration", -peak, -low * peak, braking)] * (low < 1)
+        wanted += [(joint, "acceleration", peak, high * peak, speeding)] * (high < 1)
+        assert [each[:2] for each in told] == [each[:2] for each in wanted]
+        for each, by_hand in zip(told, wanted, strict=True):
+            assert each[2:] == pytest.approx(by_hand[2:], rel=1e-6)
+
+
+def test_of_points_the_first_one_is_where_the_curve_to_it_arrives() -> None:
+    """With velocities alone a cubic, from rest to rest as fast as 3 D / (2 T) in its middle."""
+    t, q = 0.5 + 0.1 * np.arange(21), STILL.copy()
+    qd = np.zeros((21, 7))
+    qd[1:, 2] = 9.0  # of the others nothing counts
+    rows = replace(FRANKA, t=t, q=q, qd=qd, qdd=None)
+    free, bound = np.tile([-np.inf, np.inf], (7, 1)), np.tile([-0.59, 0.59], (7, 1))
+    (told,) = approach_excesses(rows, STILL[0] - 0.2 * np.eye(7)[2], Limits(free, bound, free, free))
+    assert told == (2, "velocity", pytest.approx(0.6), 0.59, pytest.approx(0.25))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import random_jobs
 
-from trajcli.judge.rows.rows_for_consumers import consumers_of
+from trajcli.judge.rows.rows_for_consumers import RowsForConsumer, consumers_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.byte_source import ByteSource
 
@@ -98,3 +99,48 @@ def test_rows_for_a_consumer_last_longer_and_not_more_than_twice_as_long(
 @pytest.mark.parametrize("columns", [6, 8])
 def test_rows_of_other_joints_are_for_nobody(columns: int, tmp_path: Path) -> None:
     assert found(tmp_path, np.linspace(0.0, 0.6, 7), columns=columns) == {}
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.2, -0.2])
+def test_columns_may_stand_in_any_order_and_in_units_of_their_own(beside: float, tmp_path: Path) -> None:
+    """One joint in degrees, one in radians; of those in degrees one decimal is known."""
+    job = {"version": 1, "robot": {"joints": 2}, "start": {"joints": [0.1, 0.5]}, "output": {"rate": 10}}
+    job |= {"limits": {"velocity": 9, "acceleration": 90, "jerk": None}}
+    move = {"planner": "quintic", "to": {"joints": [0.2, 0.9]}, "duration": DURATION}
+    own = plan_job(random_jobs.loaded(job | {"moves": [move]}))
+    t = np.linspace(0.0, 0.6, 7)
+    second = np.degrees(0.5 + 0.4 * t / t[-1])
+    second[-1] += beside
+    rows = np.column_stack([second, 7.0 + t, 0.1 + 0.1 * t / t[-1]])
+    np.savetxt(tmp_path / "rows.csv", rows, ("%.1f", "%.9f", "%.9f"), ",", header="q2_deg,t,q1", comments="")
+    told = {each.profile for each in consumers_of(ByteSource(str(tmp_path / "rows.csv")), own)}
+    assert ("ros-jtc" in told) == (abs(beside) < 0.1)
+
+
+@pytest.mark.parametrize("rate", [None, 1000 / 3, 125.0])
+@pytest.mark.parametrize("kind", ["slowed", "other_rows", "for_consumer", None])
+@pytest.mark.parametrize("own", ["error", "slow"])
+def test_options_are_those_that_the_plan_of_the_job_alone_has_not(
+    own: str, kind: str | None, rate: float | None
+) -> None:
+    """A job that slows down by itself needs no word for it, nor one whose plan for the consumer changes nothing."""
+    alone = SimpleNamespace(
+        loaded=SimpleNamespace(job=SimpleNamespace(when_over_limit=own)),
+        events=[SimpleNamespace(kind="slowed")],
+    )
+    kinds = ["stretched", *([kind] if kind else [])]
+    found = SimpleNamespace(events=[SimpleNamespace(kind=each) for each in kinds])
+    words = RowsForConsumer("ur-servoj", alone.loaded, rate).options(alone, found).split()  # type: ignore[arg-type]
+    assert words[:2] == ["--for", "ur-servoj"]
+    assert ("--rate" in words) == (rate is not None)
+    if rate is not None:
+        assert float(words[words.index("--rate") + 1]) == pytest.approx(rate, rel=1e-14)
+    assert (words[-2:] == ["--set", "when_over_limit=slow"]) == (own == "error" and kind is not None)
+
+
+def test_rates_are_those_of_stamps_as_exact_as_they_stand(tmp_path: Path) -> None:
+    """At 1000 / 3 Hz, at 100 Hz less what nine decimals round, and at 100.01 Hz."""
+    for rate, wanted in ((1000 / 3, 1000 / 3), (100 * (1 - 1e-8), 100.0), (100.01, 100.01)):
+        rates = found(tmp_path, np.arange(int(0.6 * rate) + 1) / rate)
+        assert rates["ros-jtc"] == [None, pytest.approx(wanted, rel=1e-9)]
+        assert (rates["ros-jtc"][1] == 100.0) == (wanted == 100.0)
