@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,13 +35,18 @@ def plan(joints: int) -> Plan:
 
 
 def found(
-    folder: Path, t: np.ndarray, joints: int = 7, columns: int = 7, beside: tuple[float, float] = (0.0, 0.0)
+    folder: Path,
+    t: np.ndarray,
+    joints: int = 7,
+    columns: int = 7,
+    beside: tuple[float, float] = (0.0, 0.0),
+    decimals: int = 9,
 ) -> dict[str, list[float | None]]:
     """Return the rates by consumer that rows on straight lines between the ends of a plan, or beside them, may be at."""
     rows = np.column_stack([t, *[0.1 * t / t[-1]] * columns])
     rows[[0, -1], -1] += beside
     names = ",".join(["t", *(f"q{number + 1}" for number in range(columns))])
-    np.savetxt(folder / "rows.csv", rows, "%.9f", ",", header=names, comments="")
+    np.savetxt(folder / "rows.csv", rows, f"%.{decimals}f", ",", header=names, comments="")
     rates = dict[str, list[float | None]]()
     for each in consumers_of(ByteSource(str(folder / "rows.csv")), plan(joints)):
         rates.setdefault(each.profile, []).append(each.rate)
@@ -49,8 +55,8 @@ def found(
     return rates
 
 
-@pytest.mark.parametrize("joints", [3, 7])
-@pytest.mark.parametrize("rate", [10.0, 25.0, 1000.0])
+@pytest.mark.parametrize("joints", [3, 7, 8])
+@pytest.mark.parametrize("rate", [10.0, 25.0, 1000.0, 2000.0])
 def test_consumers_that_take_any_rate_are_tried_at_that_of_the_rows_too(
     rate: float, joints: int, tmp_path: Path
 ) -> None:
@@ -74,8 +80,40 @@ def test_rows_that_begin_or_end_elsewhere_are_for_nobody(beside: tuple[float, fl
     assert bool(found(tmp_path, np.linspace(0.0, 0.6, 7), beside=beside)) == (not any(beside))
 
 
-def test_rows_at_no_rate_are_tried_once(tmp_path: Path) -> None:
-    rates = found(tmp_path, np.array([0.0, 0.1, 0.25, 0.37, 0.5, 0.6]))
+@pytest.mark.parametrize(("beside", "same"), [(5e-10, True), (2e-9, False)])
+@pytest.mark.parametrize("last", [True, False])
+def test_of_many_decimals_a_billionth_is_no_other_place(
+    beside: float, last: bool, tmp_path: Path, *, same: bool
+) -> None:
+    """A motion that is planned anew for a consumer is rounded anew."""
+    ends = (0.0, beside) if last else (beside, 0.0)
+    assert bool(found(tmp_path, np.linspace(0.0, 0.6, 7), beside=ends, decimals=15)) == same
+
+
+def test_a_job_that_lists_its_times_has_none_at_the_rate_of_the_rows(tmp_path: Path) -> None:
+    own = plan(7)
+    output = own.loaded.job.output.model_copy(update={"rate": None, "times": (0.0, 0.2, DURATION)})
+    job = own.loaded.job.model_copy(update={"output": output})
+    listed = replace(own, loaded=replace(own.loaded, job=job))
+    found(tmp_path, np.arange(16) / 25)
+    told = list(consumers_of(ByteSource(str(tmp_path / "rows.csv")), listed))
+    outputs = {each.rate: each.loaded.job.output for each in told if each.profile == "ros-jtc"}
+    assert {rate: (each.rate, each.times) for rate, each in outputs.items()} == {
+        None: (None, (0.0, 0.2, DURATION)),
+        25.0: (25.0, None),
+    }
+
+
+@pytest.mark.parametrize(
+    "steps",
+    [
+        [0.1, 0.15, 0.12, 0.13, 0.1],
+        0.1 + 1.5e-6 * np.arange(6),  # each differs by little from the one before
+        [0.6],  # of two rows there is one step, which may be any
+    ],
+)
+def test_rows_at_no_rate_are_tried_once(steps: list[float], tmp_path: Path) -> None:
+    rates = found(tmp_path, np.append(0.0, np.cumsum(steps)))
     assert "ros-jtc" in rates
     assert all(tried == [None] for tried in rates.values())
 

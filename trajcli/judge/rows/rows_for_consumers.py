@@ -137,7 +137,7 @@ def _ends_of(source: ByteSource, plan: Plan, topic: str | None, field: str | Non
             extents.add(block)
             first = block[0] if first is None else first
             last = block[-1]
-            stamps.append(block[:, times[0]] * factors[times[0]])
+            stamps.append(block[:, times[0]])
     if first is None or last is None:
         return None
     t = np.concatenate(stamps)
