@@ -54,6 +54,19 @@ def test_a_row_beside_its_period_is_told_its_distance_and_the_rate(late: float) 
     assert "{rate: 1000, align: true}" in (found.hint or "")
 
 
+@pytest.mark.parametrize(("off", "broken"), [(0.9e-9, False), (1.1e-9, True)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_clock_that_counts_whole_nanoseconds_is_at_its_period(
+    off: float, side: float, *, broken: bool
+) -> None:
+    """Of stamps that are exact one nanosecond is none beside the period."""
+    rows = motion(rows=21)
+    rows = replace(rows, resolution=replace(rows.resolution, time=0.0))
+    t = rows.t.copy()
+    t[12:] += side * off
+    assert (told(replace(rows, t=t), "franka-fr3", "fr3-period") is not None) == broken
+
+
 def test_the_row_that_is_furthest_beside_its_period_is_told() -> None:
     """One interval of half of it is worse than one that lasts a tenth longer."""
     rows = motion(rows=21)
@@ -103,18 +116,18 @@ def test_of_stamps_that_are_too_late_the_latest_is_the_value_wherever_it_stands(
     assert (found.row, found.value, found.count) == (11, t[latest], 11)
 
 
-@pytest.mark.parametrize("joint", [0, 4])
+@pytest.mark.parametrize("joint", [0, 4, 5])
 def test_a_first_point_is_as_near_as_the_decimals_of_its_joint_tell(joint: int) -> None:
     """It is 1e-5 beside where the arm stands; of the fifth joint four decimals are known, of the others more."""
     rows = motion(period=0.1, rows=21)
-    coarse = np.where(np.arange(7) == 4, 5e-5, 1e-8)
+    coarse = np.where(np.arange(7) == 4, 5e-5, 1e-8 * np.arange(1, 8))
     rows = replace(rows, resolution=replace(rows.resolution, q=coarse))
     around = Surroundings(rows.joints, HOME[7] - 1e-5 * np.eye(7)[joint])
     found = told(rows, "ros-jtc", "jtc-first-point", around)
     assert (found is None) == (joint == 4)
     if found is not None:
-        assert (found.joint, found.value) == ("joint_1", pytest.approx(1e-5))
-        assert found.limit == pytest.approx(1.01e-6)
+        assert (found.joint, found.value) == (f"joint_{joint + 1}", pytest.approx(1e-5))
+        assert found.limit == pytest.approx(1e-6 + coarse[joint])
 
 
 def test_a_first_point_is_not_judged_where_the_arm_is_another_or_its_limits_are_unknown() -> None:
@@ -129,15 +142,18 @@ def test_a_first_point_is_not_judged_where_the_arm_is_another_or_its_limits_are_
         assert unjudged["jtc-first-point"].startswith(why)
 
 
+@pytest.mark.parametrize("span", [0.5, 0.005])
 @pytest.mark.parametrize("worse", ["velocity", "acceleration"])
-def test_of_limits_on_the_curve_to_the_first_point_the_one_that_is_passed_further_is_told(worse: str) -> None:
-    """A quintic over 0.2 rad in 0.5 s: 15/8 D / T and 10 / sqrt(3) D / T^2; one is 1.1 times its limit, one 1.3 times."""
+def test_of_limits_on_the_curve_to_the_first_point_the_one_that_is_passed_further_is_told(
+    worse: str, span: float
+) -> None:
+    """A quintic over 0.2 rad: 15/8 D / T and 10 / sqrt(3) D / T^2; one is 1.1 times its limit, one 1.3 times."""
     rows = motion(period=0.1, rows=21)
-    size = {"velocity": 15 / 8 * 0.2 / 0.5, "acceleration": 10 / 3**0.5 * 0.2 / 0.5**2}
+    size = {"velocity": 15 / 8 * 0.2 / span, "acceleration": 10 / 3**0.5 * 0.2 / span**2}
     bound = {name: value / (1.3 if name == worse else 1.1) for name, value in size.items()}
     rates = [np.tile([-each, each], (7, 1)) for each in bound.values()]
     around = Surroundings(rows.joints, HOME[7] - 0.2 * np.eye(7)[2], Limits(FREE, *rates, FREE))
-    found = told(replace(rows, t=rows.t + 0.5), "ros-jtc", "jtc-first-point", around)
+    found = told(replace(rows, t=rows.t + span), "ros-jtc", "jtc-first-point", around)
     assert found is not None
     assert (found.kind, found.joint, abs(found.value)) == (worse, "joint_3", pytest.approx(size[worse]))
     side = np.sign(found.value)
