@@ -7,6 +7,7 @@ import pytest
 from hermite_curves import hermite_pieces
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import minimize_scalar
 
 from trajcli.curves.approach import ROOM, ApproachLimits, approach_uses, durations_at_limit, uses_of_pieces
 from trajcli.curves.operations import scale_time
@@ -249,3 +250,61 @@ def test_who_is_too_near_to_a_bound_may_only_leave_it(turns: bool, side: float) 
     rows[:2] *= -1.0
     (leaves,) = approach_uses(np.array([0.0, 1.0]), rows, limits)
     assert (leaves.used > 1e6) == turns  # and comes back in its second half
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("room", [1e-4, 1e-5, 1e-6])
+def test_the_use_of_a_limit_that_is_next_to_nothing_is_as_exact(room: float, side: float) -> None:
+    """One who turns back at o^2 / (2 d) + e before a bound uses about o / d sqrt(a / e) of its limit."""
+    d, o, a = 1.0, 1.0, 2.0
+
+    def used(left: float) -> float:
+        """Return the share at so many seconds before it turns back, by its definition."""
+        within = 2 * d * (room + a * left**2)  # what 2 d x is more than o^2
+        return float(2 * a * left * (np.sqrt(o**2 + within) + o) / within)
+
+    at = np.sqrt(room / a)
+    most = minimize_scalar(lambda share: -used(share * at), bounds=(0.1, 10.0), method="bounded")
+    limits = ApproachLimits(np.array([[-3.0, 3.0]]), np.array([d]), np.array([o]))
+    distance = np.array([a, -2 * a, a + o**2 / (2 * d) + room])  # a (1 - t)^2 and what is left
+    rows = -side * distance
+    rows[-1] += side * 3.0
+    (use,) = approach_uses(np.array([0.0, 1.2]), rows[:, None, None], limits)
+    assert use.used == pytest.approx(-most.fun, rel=1e-6)
+    assert use.time == pytest.approx(1.0 - most.x * at, abs=1e-4 * at)
+    assert use.velocity / use.limit == pytest.approx(use.used, rel=1e-6)
+    for at_least in (0.0, 0.5 * use.used):
+        pieces, when = uses_of_pieces(rows[:, None, None], np.array([1.2]), limits, at_least)
+        assert pieces.max() == pytest.approx(-most.fun, rel=1e-6)
+        assert when[0, int(pieces.argmax())] == pytest.approx(use.time)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_behind_a_bound_the_distance_to_it_is_negative(side: float) -> None:
+    limits = ApproachLimits(np.array([[-1.0, 1.0]]), np.array([2.0]), np.array([0.1]))
+    (use,) = approach_uses(np.array([0.0, 1.0]), side * np.array([0.1, 1.1])[:, None, None], limits)
+    assert (use.limit, use.velocity) == (0.0, side * 0.1)
+    assert -0.2 - 1e-9 <= use.distance <= -0.1 + 1e-9
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_all_the_times_at_a_limit_count(sign: float) -> None:
+    """So far from its bound that the limit stays 1: it is passed for 0.6 s twice, and for 0.3 s twice."""
+    speed = -10.0 * np.poly([0.1, 0.4, 0.6, 0.9])
+    speed[-1] += 1.0
+    way = np.polyint(speed)
+    first = way / 2.0 ** np.arange(way.size - 1, -1, -1) * 2.0  # the same in twice the time
+    rows = sign * np.stack([first, way], axis=1)[:, :, None]
+    limits = ApproachLimits(np.array([[-1e6, 1e6]]), np.array([0.5e-6]), np.zeros(1))
+    found = durations_at_limit(rows, np.array([2.0, 1.0]), limits, 1e-9)
+    np.testing.assert_allclose(found, [1.8], atol=1e-4)
+
+
+def test_components_without_a_limit_have_none_at_any_place() -> None:
+    limits = ApproachLimits(np.array([[-np.inf, np.inf], [-1.0, 1.0]]), np.array([np.inf, 2.0]), np.zeros(2))
+    with np.errstate(all="raise"):
+        down, up = limits.bounds(np.array([[3.0, 0.5], [-np.inf, 0.5]]))
+    assert (down[:, 0] == -np.inf).all()
+    assert (up[:, 0] == np.inf).all()
+    assert down[:, 1] == pytest.approx(-np.sqrt(6.0))
+    assert up[:, 1] == pytest.approx(np.sqrt(2.0))

@@ -153,7 +153,7 @@ def durations_at_limit(coefficients: Array, lengths: Array, limits: ApproachLimi
         powers = np.arange(len(polynomial), 0, -1, dtype=np.float64)
         antiderivative = np.concatenate([polynomial / powers[:, None], np.zeros((1, whole.size))])
         (inside,) = critical_points(antiderivative[:, :, None], whole, (0,))
-        roots.append(np.clip(inside[:, :, 0], 0.0, whole))
+        roots.append(inside[:, :, 0])
     knots = np.sort(np.concatenate(roots), axis=0)
     middles = (knots[1:] + knots[:-1]) / 2
     at_limit = (horner(excess, middles) >= 0) & (horner(speeds, middles) > ROOM)
@@ -234,7 +234,7 @@ def _raised(distances: Array, lengths: Array, limit: Sequence[Array], at_ends: A
         speeds = -derivative_coefficients(x, 1)
         excess = _excess(x, speeds / used[live], d, o)
         (turns,) = critical_points(excess[:, :, None], length, (0,))
-        inside = np.concatenate([np.clip(turns[:, :, 0], 0.0, length), length[None]])
+        inside = np.concatenate([turns[:, :, 0], length[None]])
         ratio, when = _largest_ratio(x, speeds, inside, (d, o))
         more = ratio > used[live]
         going = ratio > used[live] * (1.0 + _SETTLED)
@@ -257,7 +257,7 @@ def _crossings(distances: Array, lengths: Array, limit: Sequence[Array]) -> Arra
     powers = np.arange(len(shifted), 0, -1, dtype=np.float64)
     whole = np.concatenate([shifted / powers[:, None], np.zeros((1, shifted.shape[1]))])
     (inside,) = critical_points(whole[:, :, None], lengths, (0,))
-    return np.concatenate([np.clip(inside[:, :, 0], 0.0, lengths), lengths[None]])
+    return np.concatenate([inside[:, :, 0], lengths[None]])
 
 
 def _excess(distances: Array, speeds: Array, deceleration: Array, offset: Array) -> Array:
