@@ -308,3 +308,31 @@ def test_components_without_a_limit_have_none_at_any_place() -> None:
     assert (up[:, 0] == np.inf).all()
     assert down[:, 1] == pytest.approx(-np.sqrt(6.0))
     assert up[:, 1] == pytest.approx(np.sqrt(2.0))
+
+
+@pytest.mark.parametrize("pieces", [1, 2])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_use_that_is_hardly_larger_within_a_piece_than_at_its_ends_is_found(
+    side: float, pieces: int
+) -> None:
+    """Around its largest use a piece so short that nothing in it can be a hundredth more: 4e-6 more it is."""
+    d, o, a, room = 1.0, 1.0, 2.0, 1e-2
+
+    def used(left: np.ndarray) -> np.ndarray:
+        """Return the share at so many seconds before it turns back, by its definition."""
+        speed, distance = 2 * a * left, o**2 / (2 * d) + room + a * left**2
+        return np.asarray(speed / (np.sqrt(2 * d * distance) - o))
+
+    grid = np.sqrt(room / a) * np.linspace(0.5, 2.0, 200_001)
+    at, most = grid[used(grid).argmax()], used(grid).max()
+    begin, end = 1.003 * at, 0.997 * at
+    rows = -side * np.array([a, -2 * a * begin, a * begin**2 + o**2 / (2 * d) + room])
+    rows[-1] += side * 3.0
+    early = rows.copy()
+    early[-1] -= side * 1.0  # the same a metre before: it uses less
+    limits = ApproachLimits(np.array([[-3.0, 3.0]]), np.array([d]), np.array([o]))
+    coefficients = np.stack([early, rows][-pieces:], axis=1)[:, :, None]
+    (use,) = approach_uses((begin - end) * np.arange(pieces + 1), coefficients, limits)
+    assert max(used(np.array([begin, end]))) < most * (1 - 3e-6)
+    assert use.used == pytest.approx(most, rel=1e-8)
+    assert use.time == pytest.approx((pieces - 1) * (begin - end) + begin - at, abs=1e-3 * at)

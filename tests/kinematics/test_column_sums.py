@@ -12,9 +12,15 @@ from trajcli.kinematics.columns import (
     advance,
     combine,
     cross,
+    difference,
     dot,
+    minus,
     minus_product,
+    plus,
     plus_product,
+    product,
+    scaled,
+    total,
     uncombine,
 )
 
@@ -54,3 +60,32 @@ def test_vectors_of_numbers_and_arrays_agree_with_numpy(shape):
         ):
             assert all(map(same, found, expected))
     assert np.array_equal(given, before)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_of_numbers_zero_and_one_nothing_is_computed(shape):
+    """On either side: entries that must vanish stay numbers, and one that does not change stays the array it is."""
+    u = np.random.default_rng(3).normal(size=shape)
+    for one, other in ((u, 0.0), (0.0, u)):
+        assert isinstance(product(one, other), float)
+        assert product(one, other) == 0.0
+        assert total(one, other) is u
+    assert product(u, 1.0) is product(1.0, u) is difference(u, 0.0) is u
+    assert isinstance(difference(u, u), float)
+    assert same(difference(0.0, u), -u)
+    assert same(product(-1.0, u), -u)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_sums_and_multiples_of_vectors_agree_with_numpy(shape):
+    u, v, w = np.random.default_rng(4).normal(size=(3, *shape))
+    columns = [ZERO, (1.0, 0.0, 0.0), (u, 0.0, v), (v, u, w), (0.0, 2.5, u)]
+    for a, b in every(columns, repeat=2):
+        x, y = (np.stack(np.broadcast_arrays(*column, u)[:3]) for column in (a, b))
+        assert all(map(same, plus(a, b), x + y))
+        assert all(map(same, minus(a, b), x - y))
+        for factor in (0.0, 1.0, -1.0, 2.5, w):
+            assert all(map(same, scaled(factor, a), factor * x))
+    assert plus(ZERO, columns[3]) is plus(columns[3], ZERO) is minus(columns[3], ZERO) is columns[3]
+    assert scaled(0.0, columns[3]) is ZERO
+    assert scaled(1.0, columns[3]) is columns[3]
