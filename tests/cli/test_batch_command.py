@@ -106,6 +106,21 @@ def test_only_what_changed_is_planned(folder: Path, capfd: Capture) -> None:
     assert batch(capfd)[1] == dict.fromkeys("abc", "unchanged")
 
 
+def test_files_count_from_the_folder_of_their_job(
+    folder: Path, capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("one", "two"):
+        Path(name).mkdir()
+        Path(name, "a.yaml").write_text(OF_FILE)
+        Path(name, "arm.yaml").write_text(ROBOT)
+    monkeypatch.chdir("one")
+    assert lines(call(capfd, "batch", ".").out)["a"]["outcome"] == "written"
+    monkeypatch.chdir("../two")
+    assert lines(call(capfd, "batch", "../one").out)["a"]["outcome"] == "unchanged"
+    Path("../one/arm.yaml").write_text(ROBOT.replace("2", "0.01"))
+    assert lines(call(capfd, "batch", "../one").out)["a"]["outcome"] == "failed"
+
+
 def test_other_formats_are_not_unchanged(folder: Path, capfd: Capture) -> None:
     write(a=JOB)
     assert batch(capfd, "--format", "ros")[1] == {"a": "written"}

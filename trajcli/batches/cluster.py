@@ -76,10 +76,7 @@ def _client(address: str | None) -> tuple[Any, Any]:
 def _absolute(task: Task) -> Task:
     """Return a task whose paths do not depend on the folder of a process."""
     job = BatchJob(str(Path(task.job.job).absolute()), str(Path(task.job.output).absolute()))
-    known = task.known
-    if known is not None:
-        known = replace(known, files=tuple(str(Path(file).absolute()) for file in known.files))
-    return replace(task, job=job, known=known)
+    return replace(task, job=job)
 
 
 def _run_on_worker(task: Task, setup: Setup) -> JobOutcome:

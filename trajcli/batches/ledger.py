@@ -27,7 +27,7 @@ class LedgerEntry:
 
     Attributes:
         inputs: Hash of job, files that it names, version and format.
-        files: The paths of the files that the job names.
+        files: The paths of the files that the job names, from its folder.
         output: Hash of the file that was written.
         duration: Of the trajectory, s.
     """

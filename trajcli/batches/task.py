@@ -189,7 +189,9 @@ def _unchanged(task: Task, setup: BatchSetup) -> LedgerEntry | None:
     known, job = task.known, task.job
     if known is None or hash_of_file(job.output) != known.output:
         return None
-    now = hash_of_inputs(Path(job.job).name, read_bytes(job.job), known.files, setup.said)
+    folder = Path(job.job).parent
+    files = [str(folder / file) for file in known.files]
+    now = hash_of_inputs(Path(job.job).name, read_bytes(job.job), files, setup.said)
     return known if now == known.inputs else None
 
 
@@ -217,7 +219,13 @@ def _written(task: Task, setup: BatchSetup, hashed: InputsHash) -> LedgerEntry:
     after = hash_of_inputs(Path(job.job).name, content, files, setup.said)
     # where a file has changed meanwhile, nobody knows of which content the rows were made
     kept = hashed.value if after == hashed.value else None
-    return LedgerEntry(kept or "", files, hash_of_file(job.output) or "", plan.trajectory.duration)
+    named = tuple(_relative(file, Path(job.job).parent) for file in files)
+    return LedgerEntry(kept or "", named, hash_of_file(job.output) or "", plan.trajectory.duration)
+
+
+def _relative(file: str, folder: Path) -> str:
+    """Return the path of a file from a folder; an absolute one that is not below it stays."""
+    return str(Path(file).relative_to(folder)) if Path(file).is_relative_to(folder) else file
 
 
 def _check_files_stay(document: Document, setup: BatchSetup) -> None:
