@@ -200,9 +200,16 @@ def test_a_job_and_a_tool_of_the_command_line(arms, tmp_path):
 
 def test_the_output_appears_whole_or_not_at_all(arms, planar, tmp_path):
     file = listed(tmp_path, list(headings()))
-    for out in ("nowhere/x.yaml", "x.txt", "nominal.yaml", "measured.yaml"):
+    job = tmp_path / "job.yaml"
+    job.write_text(
+        f"version: 1\nrobot: {{file: {planar}}}\nstart: {{joints: 0}}\nmoves: [{{planner: hold, duration: 1}}]\n"
+    )
+    for arm, out in (
+        *((planar, out) for out in ("nowhere/x.yaml", "x.txt", "nominal.yaml", "measured.yaml")),
+        *((job, out) for out in ("nominal.yaml", "job.yaml")),
+    ):
         before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-        assert arms.call("calibrate", "-r", planar, file, "-o", tmp_path / out).code in (2, 4)
+        assert arms.call("calibrate", "-r", arm, file, "-o", tmp_path / out).code in (2, 4)
         assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 

@@ -188,7 +188,7 @@ WRONG = [
     (("concat", "rows.csv", "pick.csv"), 2, "has 1 joint"),
     (("reverse", "none.csv"), 4, "none.csv"),
     (("reverse", "job.yaml"), 2, "job.yaml"),
-    (("reverse", "rows.csv", "-o", "rows.csv"), 2, "-o rows.csv would overwrite rows.csv"),
+    (("reverse", "rows.csv", "-o", "rows.csv"), 2, "-o to rows.csv would overwrite the rows of rows.csv"),
     (("reverse", "rows.csv", "-o", "out.xyz"), 2, "rows are written as"),
     (("convert", "rows.csv", "-o", "out.csv", "--format", "mcap"), 2, "contradicts the name of the file"),
     (("convert", "bare.csv", "-o", "out.mcap"), 2, "--units"),

@@ -169,6 +169,10 @@ OVERWRITES = [
     ("trajcli plan own.yaml --resolved soft.yaml", "--resolved", "the job"),
     ("trajcli plan own.yaml --resolved hard.yaml", "--resolved", "the job"),
     ("trajcli plan own.yaml -o soft.csv", "the rows", "the job"),
+    ("trajcli sweep own.yaml --vary moves.0.duration=1,2 -o points.csv", "the table", "the recording"),
+    ("trajcli sweep own.yaml --vary moves.0.duration=1,2 --plot own.svg", "the picture", "the recording"),
+    ("trajcli retime rows.csv --job own.yaml -o points.csv", "-o", "the recording"),
+    ("trajcli retime rows.csv --robot own.yaml -o points.csv", "-o", "the recording"),
     ("trajcli plan - --report job.yaml < job.yaml", "--report", "the job"),
     ("trajcli plan ../$(basename $PWD)/own.yaml -q >> own.yaml", "the rows", "the job"),
 ]
@@ -189,6 +193,7 @@ def test_an_output_never_overwrites_what_was_read(
     (folder / "points.csv").write_text("q1\n0\n0.2\n")
     (folder / "soft.yaml").symlink_to("own.yaml")
     (folder / "soft.csv").symlink_to("own.yaml")
+    (folder / "own.svg").symlink_to("points.csv")
     (folder / "hard.yaml").hardlink_to(folder / "own.yaml")
     assert call(capfd, "plan", "own.yaml", "--no-output").code == 0
     before = {path: path.read_bytes() for path in folder.iterdir()}

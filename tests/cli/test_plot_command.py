@@ -132,7 +132,7 @@ def test_a_picture_never_overwrites_what_it_is_drawn_from(here: Path, capfd: Cap
     (here / "rows.svg").symlink_to("rows.csv")
     code, _, err = call(capfd, "plot", "plan.svg")
     assert code == 2
-    assert "the picture would overwrite the job plan.svg" in err
+    assert "the picture to plan.svg would overwrite the job plan.svg" in err
     assert call(capfd, "plot", "rows.csv").code == 2
     assert (here / "rows.csv").read_text().startswith("t,q1_deg")
 

@@ -165,7 +165,7 @@ def test_inputs_stay(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (folder / "job.html").write_text(TWO)
     done = call(capfd, "view", "job.html", "-o", "./job.html")
     assert done.code == 2
-    assert "would overwrite job.html" in done.err
+    assert "would overwrite the job job.html" in done.err
     assert (folder / "job.html").read_text() == TWO
 
 

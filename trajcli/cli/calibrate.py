@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from io import BytesIO
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from trajcli.errors import InputError
 from trajcli.job.inline import inline_number
 from trajcli.kinematics.calibration.fit import Options
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.queries.arm import ArmInUnits, open_arm, open_sheet
+from trajcli.queries.arm import ArmInUnits, files_of_arm, open_arm, open_sheet
 from trajcli.queries.calibration import (
     Calibration,
     calibrated_text,
@@ -27,7 +26,7 @@ from trajcli.queries.calibration import (
     plan_report,
     planned_measurements,
 )
-from trajcli.streams.whole_file import identity, whole_file
+from trajcli.streams.whole_file import refuse_overwriting, whole_file
 from trajcli.units import Quantity
 
 if TYPE_CHECKING:
@@ -86,10 +85,8 @@ def _check(options: CalibrateCommand) -> None:
     endings = (".csv",) if options.plan is not None else (".yaml", ".yml")
     if not options.output.lower().endswith(endings):
         raise InputError(f"-o {options.output}: expected a name that ends in {' or '.join(endings)}")
-    same = identity(options.output)
-    for what, path in (("the robot's file", options.robot), ("the measurements", options.file)):
-        if path is not None and same is not None and Path(path).exists() and same == identity(path, 0):
-            raise InputError(f"-o would overwrite {what} {path}", hint="name another file")
+    measured = [] if options.file is None else [("the measurements", options.file)]
+    refuse_overwriting([("-o", options.output)], [*files_of_arm(options.robot), *measured])
 
 
 def _scale(arm: ArmInUnits, options: CalibrateCommand) -> float | None:

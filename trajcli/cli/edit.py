@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from trajcli.editing.requirements import kept_limits, new_jumps, worst_deviation
 from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
 from trajcli.streams.formats import format_of
-from trajcli.streams.whole_file import identity
+from trajcli.streams.whole_file import refuse_overwriting
 from trajcli.units import Units
 
 if TYPE_CHECKING:
@@ -116,12 +116,12 @@ def run_retime(options: RetimeCommand) -> int:
         TrajcliError: When anything is wrong; then nothing was written.
     """
     from trajcli.editing.retiming import retime
-    from trajcli.queries.arm import stated_units
+    from trajcli.queries.arm import files_of_arm, stated_units
     from trajcli.streams.byte_source import ByteSource
     from trajcli.streams.reading import refuse_job
 
     arm = [name for name in (options.job, options.robot) if name is not None]
-    _check_output([options.file, *arm], options)
+    _check_output([options.file], options, (file for name in arm for file in files_of_arm(name)))
     if not arm:
         refuse_job(ByteSource(options.file))
     limits = kept_limits(options.job, options.robot)
@@ -191,15 +191,12 @@ def _check_continuity(before: EditedMotion, after: EditedMotion) -> None:
         raise VerificationError(*problems)
 
 
-def _check_output(sources: Sequence[str], options: EditCommand) -> None:
+def _check_output(sources: Sequence[str], options: EditCommand, more: Iterable[tuple[str, str]] = ()) -> None:
     """Refuse to write over a file that is read."""
     format_of(options.output, options.form)
-    if options.output in (None, "-"):
-        return
-    same = identity(str(options.output))
-    for source in sources:
-        if same is not None and same == identity(source, 0):
-            raise InputError(f"-o {options.output} would overwrite {source}", hint="name another file")
+    if options.output not in (None, "-"):
+        read = [("the rows of", source) for source in sources]
+        refuse_overwriting([("-o", str(options.output))], [*read, *more])
 
 
 def _extent(motion: EditedMotion) -> str:

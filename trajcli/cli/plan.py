@@ -17,7 +17,7 @@ from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.output.write import grid_of, write_rows, write_text
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.formats import StreamFormat, format_of
-from trajcli.streams.whole_file import identity, remove_aside, set_aside
+from trajcli.streams.whole_file import identity, refuse_overwriting, remove_aside, set_aside
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import PlanCommand
@@ -44,7 +44,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
     loaded = load_job(job, options.override, rate=options.rate, rows=options.rows, si=options.si)
     wanted = _wanted(loaded, options)
     loaded = loaded if wanted is None else wanted[0]
-    _check_inputs_stay(loaded, options)
+    refuse_overwriting(_outputs(options), files_of(loaded.document))
     log = _log_options(options)
     if log is not None:
         from trajcli.output.recording import check_log_options
@@ -243,15 +243,6 @@ def _outputs(options: PlanCommand) -> Iterator[tuple[str, str]]:
     for name, path in (("--report", options.report), ("--resolved", options.resolved)):
         if path is not None:
             yield name, path
-
-
-def _check_inputs_stay(loaded: LoadedJob, options: PlanCommand) -> None:
-    """Refuse to write over a file that the job was read from."""
-    read = {identity(path, 0): f"{what} {path}" for what, path in files_of(loaded.document)}
-    for name, path in _outputs(options):
-        same = identity(path)
-        if same is not None and same in read:
-            raise InputError(f"{name} to {path} would overwrite {read[same]}", hint="name another file")
 
 
 def _report(

@@ -21,7 +21,7 @@ from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion, read_table
-from trajcli.streams.whole_file import identity, standard_output, whole_file
+from trajcli.streams.whole_file import refuse_overwriting, standard_output, whole_file
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import PlotCommand
@@ -50,7 +50,8 @@ def run_plot(options: PlotCommand) -> int:
         )
     plans = [_planned(job, options.override) for job in jobs]
     plan, second = (*plans, None, None)[:2]
-    _check_inputs_stay(plans, rows, target)
+    read = [file for plan in plans for file in files_of(plan.loaded.document)]
+    refuse_overwriting([("the picture", target)], [*read, *(("the rows of", name) for name in rows)])
     sources = [ByteSource(name) for name in rows]
     tables = [read_table(source) for source in sources]
     judged = [] if plan is None else _checked_files(sources, plan, options)
@@ -155,16 +156,6 @@ def _is_job(name: str) -> bool:
 
 def _stem(name: str) -> str:
     return "plot" if name == "-" else Path(name).stem
-
-
-def _check_inputs_stay(plans: Sequence[Plan], rows: Sequence[str], target: str) -> None:
-    """Refuse to write over a file that is read."""
-    read = [file for plan in plans for file in files_of(plan.loaded.document)]
-    read += [("the rows of", name) for name in rows]
-    same = identity(target)
-    for what, path in read:
-        if same is not None and same == identity(path, 0):
-            raise InputError(f"the picture would overwrite {what} {path}", hint="name another file")
 
 
 def _write(content: bytes, target: str) -> None:

@@ -21,8 +21,10 @@ from trajcli.cli.batch import Progress, outcomes_of_tasks, processes_of, timeout
 from trajcli.cli.outcome import print_lines, print_remark, print_text, report_error
 from trajcli.cli.progress import is_terminal
 from trajcli.errors import InputError, TrajcliError, utf8
+from trajcli.job.read import files_of
+from trajcli.job.yaml.load import parse_document
 from trajcli.job.yaml.source import read_bytes
-from trajcli.streams.whole_file import standard_output
+from trajcli.streams.whole_file import refuse_overwriting, standard_output
 
 if TYPE_CHECKING:
     from trajcli.cli.motion_commands import SweepCommand
@@ -97,6 +99,9 @@ def _sweep(options: SweepCommand) -> Sweep:
         raise InputError("--seed is about points drawn by chance", hint="say how many with --samples N")
     content = read_bytes(options.job)
     file = "<stdin>" if options.job == "-" else options.job
+    outputs = (("the table", options.output), ("the picture", options.plot))
+    written = [(name, path) for name, path in outputs if path is not None]
+    refuse_overwriting(written, files_of(parse_document(content, file)))
     return sweep_of(file, content, [parse_axis(text) for text in options.vary], samples, seed or 0)
 
 

@@ -16,7 +16,7 @@ from trajcli.player.page import check_page_name, page_of
 from trajcli.player.scene import BUDGET
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion
-from trajcli.streams.whole_file import identity, standard_output, whole_file
+from trajcli.streams.whole_file import refuse_overwriting, standard_output, whole_file
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import ViewCommand
@@ -97,7 +97,7 @@ def _shown_job(name: str, options: ViewCommand) -> _Shown:
     from trajcli.player.scene import scene_of_plan
 
     loaded = load_job(name, options.override)
-    _check_inputs_stay(options.output, [path for _, path in files_of(loaded.document)])
+    _check_inputs_stay(options.output, files_of(loaded.document))
     with progress(), np.errstate(all="ignore"):  # what is not finite is for the checks to find
         plan = plan_of(loaded)
     scene = scene_of_plan(plan, options.meshes)
@@ -113,7 +113,7 @@ def _shown_job(name: str, options: ViewCommand) -> _Shown:
 def _shown_file(name: str, robot: str | None, output: str | None, meshes: float) -> _Shown:
     from trajcli.player.recorded import scene_of_file
 
-    _check_inputs_stay(output, [name])
+    _check_inputs_stay(output, [("the rows of", name)])
     opened = ByteSource(name)
     checked = None if robot is None else _checked_or_reason(opened, robot)
     scene = scene_of_file(opened, robot, checked, meshes)
@@ -144,11 +144,9 @@ def _check_output(path: str | None) -> None:
         check_page_name(path)
 
 
-def _check_inputs_stay(output: str | None, inputs: Sequence[str]) -> None:
-    same = None if output is None or output == "-" else identity(output)
-    for path in inputs:
-        if same is not None and same == identity(path, 0):
-            raise InputError(f"the page to {output} would overwrite {path}", hint="name another file")
+def _check_inputs_stay(output: str | None, inputs: Iterable[tuple[str, str]]) -> None:
+    if output not in (None, "-"):
+        refuse_overwriting([("the page", str(output))], inputs)
 
 
 def _write(page: bytes, path: str | None) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -137,6 +137,21 @@ def names_job(name: str) -> bool:
     if name in catalogue_names() or not Path(name).is_file() or is_urdf(name):
         return False
     return bool({"robot", "moves"} & read_document(name).plain().keys())
+
+
+def files_of_arm(name: str) -> Iterator[tuple[str, str]]:
+    """Yield the files that `open_sheet` reads: what each is, and its path.
+
+    Raises:
+        InputError: When the file is no YAML.
+        FileError: When it cannot be read.
+    """
+    if names_job(name):
+        from trajcli.job.read import files_of  # brings the planners
+
+        yield from files_of(read_document(name))
+    elif name not in catalogue_names():
+        yield "the robot's file", name
 
 
 def stated_units(name: str) -> Units | None:

@@ -8,13 +8,13 @@ import re
 import secrets
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from io import UnsupportedOperation
 from pathlib import Path
 from typing import BinaryIO
 
-from trajcli.errors import FileError
+from trajcli.errors import FileError, InputError
 
 _DESCRIPTOR = re.compile(
     r"/dev/(?:(?P<name>stdout|stderr)|fd/(?P<number>[0-9]+))|/proc/self/fd/(?P<other>[0-9]+)"
@@ -173,6 +173,19 @@ def identity(path: str, descriptor: int = 1) -> tuple[object, ...] | None:
     if stat.S_ISCHR(status.st_mode) or stat.S_ISBLK(status.st_mode):
         return None if number is None else ("descriptor", number)
     return ("file", status.st_dev, status.st_ino)
+
+
+def refuse_overwriting(outputs: Iterable[tuple[str, str]], inputs: Iterable[tuple[str, str]]) -> None:
+    """Refuse to write over a file that is read; of outputs and inputs both: what each is, and its path.
+
+    Raises:
+        InputError: When one would be.
+    """
+    read = {identity(path, 0): f"{what} {path}" for what, path in inputs}
+    for name, path in outputs:
+        same = identity(path)
+        if same is not None and same in read:
+            raise InputError(f"{name} to {path} would overwrite {read[same]}", hint="name another file")
 
 
 def _open_special(path: str) -> BinaryIO | None:
