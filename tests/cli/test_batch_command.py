@@ -199,10 +199,13 @@ def test_a_file_that_no_batch_wrote_stays(folder: Path, capfd: Capture) -> None:
     write(a=JOB)
     assert batch(capfd)[0] == 0
     write(a=FAST, b=FAST)
-    for name in "ab":
-        Path(f"out/{name}.csv").write_text("of somebody else")
+    for name in ("a.csv", "b.csv", "a.csv.stale"):
+        Path(f"out/{name}").write_text("of somebody else")
     assert batch(capfd)[0] == 1
-    assert files("out") == {"a.csv", "b.csv", STEM}
+    assert files("out") == {"a.csv", "b.csv", "a.csv.stale", STEM}
+    write(a=JOB, b=JOB)
+    assert batch(capfd)[0] == 0
+    assert Path("out/a.csv.stale").read_text() == "of somebody else"
 
 
 def test_annotations_of_a_batch_are_one_document(folder: Path, capfd: Capture) -> None:

@@ -53,6 +53,16 @@ def test_rows_of_an_earlier_plan_are_set_aside(text: str, code: int, job: Path, 
     assert {path.name for path in Path().iterdir()} == {"job.yaml", "rows.csv"}
 
 
+def test_what_was_set_aside_before_stays(job: Path, capfd: Capture) -> None:
+    Path("rows.csv.stale").write_text("my notes")
+    job.write_text(FAST)
+    for number, name in enumerate(("rows.csv.stale2", "rows.csv.stale3")):
+        Path("rows.csv").write_text(str(number))
+        assert f"it is {name} now" in call(capfd, "plan", job, "-o", "rows.csv").err
+        assert Path(name).read_text() == str(number)
+    assert Path("rows.csv.stale").read_text() == "my notes"
+
+
 @pytest.mark.parametrize("words", [["--no-output"], ["-o", "rows.csv", "--set", "robot={file: none}"]])
 def test_rows_stay_where_nothing_was_planned_in_their_place(
     words: list[str], job: Path, capfd: Capture

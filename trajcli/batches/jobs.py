@@ -147,16 +147,21 @@ class Ledgers:
 
     def add(self, job: BatchJob, entry: LedgerEntry) -> None:
         """Take the entry of an output that was written, and write all there are now and then."""
-        remove_aside(job.output)
+        if self._has_written(job, f"{job.output}.stale"):
+            remove_aside(job.output)
         self._entries[job.output] = entry
         if monotonic() - self._written > _PERIOD:
             self.write()
 
     def set_aside(self, job: BatchJob) -> str | None:
         """Rename rows that an earlier batch wrote and this one could not; return their name then."""
-        entry = read_ledger(self._paths[job.output]).get(_name(job.output))
-        written = entry is not None and hash_of_file(job.output) == entry.output
-        return set_aside(job.output) if written else None
+        return set_aside(job.output) if self._has_written(job, job.output) else None
+
+    def _has_written(self, job: BatchJob, file: str) -> bool:
+        """Return whether a file holds the rows that an earlier batch wrote for a job."""
+        content = hash_of_file(file)
+        entry = None if content is None else read_ledger(self._paths[job.output]).get(_name(job.output))
+        return entry is not None and content == entry.output
 
     def write(self) -> None:
         """Write all entries into the ledgers of their folders."""

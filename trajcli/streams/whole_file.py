@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from io import UnsupportedOperation
+from itertools import count
 from pathlib import Path
 from typing import BinaryIO
 
@@ -120,11 +121,13 @@ def _hint(error: OSError) -> str | None:
 def set_aside(path: str) -> str | None:
     """Rename what is in a file, which is of no use under its name any more; return its name then.
 
-    Where there is no file, or it is a device or a pipe, or cannot be renamed, nothing is done.
+    The name ends in .stale, or .stale2 and so on where such a file is there: none is replaced. Where there is
+    no file, or it is a device or a pipe, or cannot be renamed, nothing is done.
     """
     if path == "-" or is_special(path) or not Path(path).is_file():
         return None
-    aside = f"{path}.stale"
+    names = (f"{path}.stale{number if number > 1 else ''}" for number in count(1))
+    aside = next(name for name in names if not os.path.lexists(name))
     with suppress(OSError):
         Path(path).replace(aside)
         return aside
