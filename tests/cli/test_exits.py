@@ -60,6 +60,25 @@ def test_a_missing_file_and_no_arguments(capfd: Capture) -> None:
     assert "Missing argument 'JOB'" in err
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "check @",
+        "diff @ b.csv",
+        "diff a b @",
+        "fk -r @ 0",
+        "batch @",
+        "robots @",
+        "init @",
+        "view a.csv --robot @",
+    ],
+)
+def test_names_that_are_too_long_are_no_bug(words: str, capfd: Capture) -> None:
+    outcome = call(capfd, *words.replace("@", "n" * 300).split())
+    assert outcome.code in (2, 4)
+    assert "error: " in outcome.err or "failed: " in outcome.err
+
+
 def test_an_interrupt_is_130(tmp_path: Path) -> None:
     pipe = tmp_path / "rows"
     os.mkfifo(pipe)

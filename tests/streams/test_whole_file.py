@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from trajcli.errors import FileError
-from trajcli.streams.whole_file import standard_output, whole_file
+from trajcli.streams.whole_file import is_folder, kind_of, paths_below, standard_output, whole_file
 
 AS_ROOT = os.geteuid() == 0
 
@@ -148,6 +148,30 @@ def test_what_may_not_be_written_is_not_replaced(tmp_path):
         write(path)
     tmp_path.chmod(0o755)
     assert path.read_text() == "old"
+
+
+@pytest.mark.skipif(AS_ROOT, reason="root may read everything")
+def test_closed_folders_are_errors_of_files(tmp_path):
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0)
+    with pytest.raises(FileError, match="cannot be read: Permission denied"):
+        paths_below(closed)
+    assert is_folder(closed)
+    assert not is_folder(closed / "a")
+    with pytest.raises(FileError, match="cannot read"):
+        kind_of(closed / "a")
+
+
+def test_what_stands_under_a_path(tmp_path):
+    (tmp_path / "a").touch()
+    (tmp_path / "loop").symlink_to("loop")
+    found = [kind_of(tmp_path / name) for name in ("", "a", "a/b", "none", "loop", "b\0")]
+    assert found == ["folder", "file", None, None, None, None]
+    assert kind_of("/dev/null") == "other"
+    assert not is_folder(tmp_path / ("x" * 300))
+    with pytest.raises(FileError, match="File name too long") as caught:
+        kind_of(tmp_path / ("x" * 300))
+    assert caught.value.exit_code == 4
 
 
 def test_a_disk_that_fills_leaves_what_was(tmp_path):

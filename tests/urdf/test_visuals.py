@@ -202,7 +202,7 @@ def test_packages_are_found_where_ros_looks(tmp_path: Path, monkeypatch: pytest.
     }
     assert {key: found_file(name, urdf) for key, name in names.items()} == places
     assert found_file(f"file://{places['ros']}", urdf) == places["ros"]
-    for name in ("package://far/nothing.stl", "http://example.org/a.stl", "nothing.stl", ""):
+    for name in ("package://far/nothing.stl", "http://example.org/a.stl", "nothing.stl", "", "n" * 300):
         assert found_file(name, urdf) is None
 
 

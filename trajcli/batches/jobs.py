@@ -9,10 +9,10 @@ from pathlib import Path
 from time import monotonic
 
 from trajcli.batches.ledger import LEDGER_NAME, LedgerEntry, hash_of_file, read_ledger, write_ledger
-from trajcli.errors import FileError, InputError, utf8
+from trajcli.errors import InputError, utf8
 from trajcli.frozen import comparable, frozen
 from trajcli.streams.formats import ENDINGS, FormatName
-from trajcli.streams.whole_file import identity, remove_aside, set_aside
+from trajcli.streams.whole_file import identity, is_folder, paths_below, remove_aside, set_aside
 
 _YAML = (".yaml", ".yml")
 _KEY_OF_JOBS = re.compile(rb"""(?m)(?:^|^\s*\{\s*|,\s*)["']?(?:version|start|moves)["']?\s*:""")
@@ -68,7 +68,7 @@ def find_jobs(names: Sequence[str], folder: str | None, form: FormatName) -> Bat
     for name in names:
         if name == "-":
             raise InputError("a batch reads no standard input", hint="name files or folders")
-        if not Path(name).is_dir():
+        if not is_folder(name):
             jobs.append(BatchJob(name, _output(Path(name), Path(Path(name).name), folder, ending)))
             continue
         for path in _yaml_files(Path(name), folder):
@@ -93,14 +93,10 @@ def _output(job: Path, below: Path, folder: str | None, ending: str) -> str:
 def _yaml_files(folder: Path, output: str | None) -> Iterator[Path]:
     """Yield the YAML files below a folder by name, but no hidden ones and none that a batch has written."""
     written = None if output is None else Path(output).resolve()
-    try:
-        paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in _YAML)
-    except OSError as error:
-        raise FileError(f"the folder '{folder}' cannot be read: {error.strerror}") from None
-    for path in paths:
+    for path in (path for path in paths_below(folder) if path.suffix.lower() in _YAML):
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         below = written is not None and written != folder.resolve() and written in path.resolve().parents
-        if not hidden and not below and not path.is_dir():
+        if not hidden and not below and not is_folder(path):
             yield path
 
 

@@ -10,6 +10,7 @@ from trajcli.cli.outcome import error_as_json, print_json, print_lines, report_e
 from trajcli.comparison.difference import as_json, compare, describe, parse_tolerances
 from trajcli.errors import InputError, TrajcliError
 from trajcli.streams.reading import is_log, motion_files, read_table
+from trajcli.streams.whole_file import is_folder, kind_of
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import DiffCommand
@@ -27,13 +28,13 @@ def run_diff(options: DiffCommand) -> int:
         raise InputError("diff compares two files, and there is one", hint="trajcli diff A B")
     if others == ["-"] and last == "-":
         raise InputError("only one of the files can be standard input")
-    alone = len(others) == 1 and not any(Path(name).is_dir() for name in options.files)
+    alone = len(others) == 1 and not any(map(is_folder, options.files))
     _check_view(options, alone=alone)
     tolerances = [parse_tolerances(text) if text else {} for text in (options.atol, options.rtol)]
     code, found = 0, list[dict[str, Any]]()
     for a, b in [(others[0], last)] if alone else _pairs(others, last):
         try:
-            lacking = [name for name in (a, b) if not alone and not Path(name).is_file()]
+            lacking = [name for name in (a, b) if not alone and kind_of(name) != "file"]
             mapping, text = _without(a, b, lacking[0]) if lacking else _compared(a, b, options, tolerances)
         except TrajcliError as error:
             if alone:
@@ -82,10 +83,10 @@ def _without(a: str, b: str, lacking: str) -> tuple[dict[str, Any], str]:
 
 def _pairs(others: Sequence[str], folder: str) -> Iterator[tuple[str, str]]:
     """Yield pairs of files of the same names; of two folders also those that one of them lacks."""
-    if not Path(folder).is_dir():
+    if not is_folder(folder):
         raise InputError(f"several files are compared with those of a folder, and {folder} is none")
     for other in others:
-        if Path(other).is_dir():
+        if is_folder(other):
             sides = (other, folder)
             names = {str(Path(file).relative_to(side)) for side in sides for file in motion_files(side)}
             yield from ((str(Path(other, name)), str(Path(folder, name))) for name in sorted(names))

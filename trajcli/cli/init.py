@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from trajcli.errors import InputError
-from trajcli.streams.whole_file import standard_output, whole_file
+from trajcli.streams.whole_file import kind_of, standard_output, whole_file
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import InitCommand
@@ -28,7 +28,7 @@ def run_init(options: InitCommand) -> int:
         with standard_output() as out:
             out.write(text)
         return 0
-    if not options.force and Path(file).exists():
+    if not options.force and kind_of(file) is not None:
         raise InputError(f"{file} exists", hint="name another file, or say --force to overwrite it")
     with whole_file(file) as out:
         out.write(text)

@@ -21,7 +21,7 @@ from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion, read_table
-from trajcli.streams.whole_file import refuse_overwriting, standard_output, whole_file
+from trajcli.streams.whole_file import kind_of, refuse_overwriting, standard_output, whole_file
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import PlotCommand
@@ -114,7 +114,7 @@ def _files_and_joints(words: Sequence[str], joints: Sequence[str]) -> tuple[list
     """Return the files among the words, and all joints: `--joints a b` leaves the second one to the words."""
     if not joints:
         return list(words), ()
-    files = [word for word in words if word == "-" or Path(word).exists() or Path(word).suffix]
+    files = [word for word in words if word == "-" or kind_of(word) or Path(word).suffix]
     if not files:
         raise InputError("there is no file to plot", hint="name a job or a file of rows before --joints")
     return files, (*joints, *(word for word in words if word not in files))

@@ -19,6 +19,7 @@ from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import links_of
+from trajcli.streams.whole_file import kind_of
 from trajcli.units import (
     Quantity,
     Units,
@@ -117,7 +118,7 @@ def open_sheet(name: str) -> RobotSheet:
         InputError: When there is no such robot, or with every flaw of the file.
         FileError: When the file cannot be read.
     """
-    if name in catalogue_names() or not Path(name).is_file() or is_urdf(name):
+    if name in catalogue_names() or kind_of(name) != "file" or is_urdf(name):
         return load_sheet(name)
     if not names_job(name):
         return load_sheet(Path(name))
@@ -134,7 +135,7 @@ def names_job(name: str) -> bool:
         InputError: When the file is no YAML.
         FileError: When it cannot be read.
     """
-    if name in catalogue_names() or not Path(name).is_file() or is_urdf(name):
+    if name in catalogue_names() or kind_of(name) != "file" or is_urdf(name):
         return False
     return bool({"robot", "moves"} & read_document(name).plain().keys())
 

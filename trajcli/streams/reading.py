@@ -11,7 +11,7 @@ from trajcli.errors import InputError, utf8
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, TimedRows, in_columns
 from trajcli.streams.table import Table, joined_blocks
-from trajcli.streams.whole_file import is_special
+from trajcli.streams.whole_file import is_folder, is_special, kind_of, paths_below
 
 _ALL_DECIMALS = 17  # of a float64
 ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap", ".npy", ".npz")
@@ -167,10 +167,11 @@ def motion_files(name: str) -> list[str]:
 
     Raises:
         InputError: When a folder holds none.
+        FileError: When it cannot be read.
     """
-    if not Path(name).is_dir():
+    if not is_folder(name):
         return [name]
-    paths = [path for path in sorted(Path(name).rglob("[!.]*")) if path.is_file()]
+    paths = [path for path in paths_below(name, "[!.]*") if kind_of(path) == "file"]
     visible = (path for path in paths if not any(p.startswith(".") for p in path.relative_to(name).parts))
     found = [str(path) for path in visible if holds_motion(path)]
     if not found:

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from io import UnsupportedOperation
 from itertools import count
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Literal
 
 from trajcli.errors import FileError, InputError
 
@@ -151,6 +151,43 @@ def is_special(path: str) -> bool:
     except (OSError, ValueError):
         return False
     return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
+
+
+def kind_of(path: str | Path) -> Literal["file", "folder", "other"] | None:
+    """Return what stands under a path; None where there is nothing.
+
+    Raises:
+        FileError: When it cannot be looked at: a folder on the way is closed, or the name is too long.
+    """
+    try:
+        mode = Path(path).stat().st_mode
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return None
+    except OSError as error:
+        if error.errno == errno.ELOOP:  # links in a circle lead to nothing
+            return None
+        raise FileError(f"cannot read {path}: {error.strerror or error}") from None
+    return "file" if stat.S_ISREG(mode) else "folder" if stat.S_ISDIR(mode) else "other"
+
+
+def is_folder(path: str | Path) -> bool:
+    """Return whether a path is that of a folder; not where it cannot be looked at: who reads it says why."""
+    with suppress(FileError):
+        return kind_of(path) == "folder"
+    return False
+
+
+def paths_below(folder: str | Path, pattern: str = "*") -> list[Path]:
+    """Return what is below a folder, by name.
+
+    Raises:
+        FileError: When the folder cannot be read.
+    """
+    try:
+        next(Path(folder).iterdir(), None)  # `rglob` takes a folder that may not be read for an empty one
+        return sorted(Path(folder).rglob(pattern))
+    except OSError as error:
+        raise FileError(f"the folder '{folder}' cannot be read: {error.strerror}") from None
 
 
 def descriptor_of(path: str) -> int | None:

@@ -159,7 +159,7 @@ def found_file(name: str, urdf: Path) -> Path | None:
         paths = (folder / inside for folder in _packages(package, urdf))
     else:
         return None
-    return next((path for path in paths if path.is_file()), None)
+    return next((path for path in paths if os.path.isfile(path)), None)  # noqa: PTH113  (Path's own may raise)
 
 
 def _packages(package: str, urdf: Path) -> Iterator[Path]:
