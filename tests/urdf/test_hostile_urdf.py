@@ -127,6 +127,8 @@ def test_links_in_a_circle_are_refused() -> None:
         read(circle + joint.format("k", "b", "a") + "</robot>")
     with pytest.raises(InputError, match="circle"):
         read(circle + joint.format("k", "b", "a") + "</robot>", tip="b")
+    with pytest.raises(InputError, match="behind link 'a' go in a circle"):
+        read(circle + joint.format("k", "b", "a") + "</robot>", root="a")
 
 
 def test_hints_say_what_to_do() -> None:

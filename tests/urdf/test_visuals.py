@@ -114,6 +114,12 @@ def test_plain_bodies_have_their_volumes() -> None:
         ("a.dae", b"<COLLADA", "damaged"),
         ("a.dae", b'<!DOCTYPE x [<!ENTITY a "b">]><COLLADA/>', "DOCTYPE"),
         ("a.dae", dae().replace(b"#g", b"#h"), "damaged"),
+        (
+            "a.dae",
+            dae().replace(b"<node><scale>", b'<node id="n"><instance_node url="#n"/><scale>'),
+            "holds itself",
+        ),
+        ("a.dae", dae().replace(b"<scale>", b"<node>" * 2000 + b"</node>" * 2000 + b"<scale>"), "damaged"),
         ("a.fbx", b"", ".stl, .obj, .dae"),
     ],
 )

@@ -12,6 +12,7 @@ import random
 import re
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, suppress
+from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
@@ -39,6 +40,7 @@ from trajcli.streams.whole_file import whole_file
 
 MOST_ROWS = 1_000_000
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LARGEST_EXPONENT = 308  # of a normal float64, by tens
 _RANGE = re.compile(rf"\s*({_NUMBER}?)\.\.({_NUMBER})(?::(.*))?")
 _VERDICTS: dict[int, PointVerdict] = {1: "exceeded", 3: "unreachable"}
 _NAMED = ("points", "frames", "tools", "sequences")
@@ -98,6 +100,9 @@ def _spread(text: str, first: str, last: str, count: str | None) -> Iterator[flo
     if count is None or not count.isdecimal() or not 2 <= int(count) <= MOST_ROWS:
         hint = f"such as {first}..{last}:9, both ends included"
         raise InputError(f"--vary {text}: a range needs how many values, 2 to {MOST_ROWS}", hint=hint)
+    for end in (first, last):
+        if math.isinf(float(end)) or abs(Decimal(end).adjusted()) > _LARGEST_EXPONENT:
+            raise InputError(f"--vary {text}: {end} is no number from 1e-{_LARGEST_EXPONENT} to 1.79e308")
     low, high, steps = Fraction(first), Fraction(last), int(count) - 1
     return (float(low + (high - low) * step / steps) for step in range(steps + 1))
 

@@ -53,7 +53,7 @@ def read_mesh(path: Path) -> list[Surface]:
         raise ValueError(f"it is larger than {MOST_BYTES / 1e6:g} MB")
     try:
         found = [each for each in read(path.read_bytes()) if len(each.corners)]
-    except (IndexError, KeyError, AttributeError, TypeError, SyntaxError) as error:
+    except (IndexError, KeyError, AttributeError, TypeError, SyntaxError, RecursionError) as error:
         raise ValueError("it is damaged") from error
     if not found or not all(np.isfinite(each.corners).all() for each in found):
         raise ValueError("it holds no triangles, or some that are nowhere")
@@ -114,8 +114,15 @@ def _target(element: Any) -> str:  # noqa: ANN401
     return str(element.get("url") or element.get("target") or element.get("source") or "").removeprefix("#")
 
 
-def _nodes(node: Any, pose: Array, named: dict[str, Any]) -> Iterator[Surface]:  # noqa: ANN401
-    """Yield what stands in a node and in those below it."""
+def _nodes(
+    node: Any,  # noqa: ANN401
+    pose: Array,
+    named: dict[str, Any],
+    around: tuple[Any, ...] = (),
+) -> Iterator[Surface]:
+    """Yield what stands in a node, which stands in others, and in those below it."""
+    if node in around:
+        raise ValueError("a node of it holds itself")
     pose = pose @ _pose(node)
     for instance in node.findall("instance_geometry"):
         bound = {each.get("symbol"): _target(each) for each in instance.iter("instance_material")}
@@ -125,10 +132,9 @@ def _nodes(node: Any, pose: Array, named: dict[str, Any]) -> Iterator[Surface]: 
                 corners = _corners(part, mesh, named)
                 color = _color(named.get(bound.get(part.get("material"), "")), named)
                 yield Surface(corners @ pose[:3, :3].T + pose[:3, 3], color)
-    for other in node.findall("instance_node"):
-        yield from _nodes(named[_target(other)], pose, named)
-    for below in node.findall("node"):
-        yield from _nodes(below, pose, named)
+    others = [named[_target(other)] for other in node.findall("instance_node")]
+    for below in (*others, *node.findall("node")):
+        yield from _nodes(below, pose, named, (*around, node))
 
 
 def _pose(node: Any) -> Array:  # noqa: ANN401

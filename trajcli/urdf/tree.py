@@ -140,8 +140,7 @@ class _Tree:
             joints.append(self._above[link])
             link = joints[-1].parent
             if len(joints) > len(self._above):
-                message = f"the joints above link '{tip}' go in a circle"
-                raise InputError(Problem(message, "a robot is a tree of links", _top(self._document)))
+                raise self._no_tree(f"the joints above link '{tip}' go in a circle")
         if root is not None and link != root:
             listed = valid_names(self.tips(root, ""), f"behind '{root}' end")
             raise InputError(Problem(f"link '{tip}' is not behind link '{root}'", listed, field=("tip",)))
@@ -181,9 +180,11 @@ class _Tree:
         """Return the links that are no joint's child, in the file's order."""
         starts = [link for link in self._document.links if link not in self._above]
         if not starts:
-            message = "every link is the child of a joint: they go in a circle"
-            raise InputError(Problem(message, "a robot is a tree of links", _top(self._document)))
+            raise self._no_tree("every link is the child of a joint: they go in a circle")
         return starts
+
+    def _no_tree(self, message: str) -> InputError:
+        return InputError(Problem(message, "a robot is a tree of links", _top(self._document)))
 
     def _behind(self, start: str, *, whole: bool) -> Iterator[tuple[str, int, int]]:
         """Yield each link behind a link, how many joints that move lead to it, and how many fixed ones."""
@@ -192,6 +193,8 @@ class _Tree:
             link, moving, fixed = links.pop()
             yield link, moving, fixed
             for joint in self._below.get(link, []):
+                if joint.child == start:
+                    raise self._no_tree(f"the joints behind link '{start}' go in a circle")
                 if whole or not self._is_finger(joint):
                     stays = joint.type == "fixed"
                     links.append((joint.child, moving + joint.moves, fixed + 1 if stays else 0))
