@@ -240,3 +240,21 @@ def test_what_a_plan_for_a_consumer_writes_is_checked_for_it(
     faster = tmp_path / "faster.yaml"  # the same rows against limits that they pass by a thousandth
     faster.write_text(f"{text}when_over_limit: slow\n".replace("acceleration: 600", "acceleration: 599.4"))
     assert call(capfd, "check", rows, "--job", faster, "--for", "ros-jtc", "--json").code == 1
+
+
+def test_a_goal_with_a_joint_that_is_not_of_the_robot(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The controller refuses it, though the robot's joints are all there."""
+    message = yaml.safe_load(goal())
+    message["joint_names"].append("finger")
+    for point in message["points"]:
+        for key in ("positions", "velocities", "accelerations"):
+            point[key].append(0.0)
+    file = tmp_path / "goal.yaml"
+    file.write_text(json.dumps(message))
+    words = ("check", str(file), "--robot", "ur5e", "--for", "ros-jtc", "--format", "json")
+    code, out, _ = call(capfd, *words)
+    (found,) = (each for each in json.loads(out)["findings"] if each["rule"] == "jtc-joint-names")
+    assert code == 1
+    assert "the robot has no joint 'finger'" in found["message"]

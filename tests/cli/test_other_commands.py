@@ -96,6 +96,23 @@ def test_schema(kind: str, capfd: Capture) -> None:
     assert out == (ROOT / "schemas" / f"{kind}.schema.json").read_text()
 
 
+def goal(names: str, rows: list[list[float]]) -> str:
+    points = [f"- {{positions: {row}, time_from_start: {{sec: {k}}}}}\n" for k, row in enumerate(rows)]
+    return f"joint_names: [{names}]\npoints:\n{''.join(points)}"
+
+
+def test_diff_of_messages_goes_by_the_names_of_joints(capfd: Capture) -> None:
+    Path("a.yaml").write_text(goal("x, y", [[1.0, 2.0], [3.0, 5.0]]))
+    Path("same.yaml").write_text(goal("y, x", [[2.0, 1.0], [5.0, 3.0]]))
+    Path("numbers.yaml").write_text(goal("y, x", [[1.0, 2.0], [3.0, 5.0]]))
+    Path("other.yaml").write_text(goal("x, z", [[1.0, 2.0], [3.0, 5.0]]))
+    assert call(capfd, "diff", "a.yaml", "same.yaml").code == 0
+    assert call(capfd, "diff", "a.yaml", "numbers.yaml").code == 1
+    code, _, err = call(capfd, "diff", "a.yaml", "other.yaml")
+    assert code == 2
+    assert "a.yaml has x, y; other.yaml has x, z" in err
+
+
 def test_init_writes_a_job_that_plans(capfd: Capture) -> None:
     code, out, err = call(capfd, "init")
     assert (code, out) == (0, "")

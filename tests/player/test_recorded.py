@@ -106,3 +106,13 @@ def test_what_cannot_be_judged_says_why(tmp_path: Path) -> None:
     assert shown["verdict"] == {"state": "unjudged", "text": "not judged"}
     assert shown["findings"] == []
     assert shown["notes"][1] == "Why not: it has no limits."
+
+
+def test_joints_of_a_message_move_those_of_the_robot_with_their_names(tmp_path: Path) -> None:
+    """The second joint of planar2r alone turns: the tool stays within its link of 0.2 m around (0.3, 0) m."""
+    points = "".join(f"- {{positions: [{k * pi / 2}, 0.0], time_from_start: {{sec: {k}}}}}\n" for k in (0, 1))
+    file = tmp_path / "goal.yaml"
+    file.write_text(f"joint_names: [j2, j1]\npoints:\n{points}")
+    positions = scene_of_file(str(file), "planar2r")["tool"]["positions"]
+    assert positions["low"][:2] == pytest.approx([0.3, 0], abs=1e-12)
+    assert positions["high"][:2] == pytest.approx([0.5, 0.2])

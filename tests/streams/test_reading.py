@@ -182,3 +182,15 @@ def test_json_lines_of_others(tmp_path):
     assert table.names == ("t", "q1", "q2", "temperature")
     assert table.columns.shape == (5000, 4)
     assert table.columns[4999].tolist() == [499.9, 4999, 9998, 5019]
+
+
+def test_joints_of_a_message_stand_in_the_order_that_is_wanted(tmp_path: Path) -> None:
+    path = tmp_path / "goal.yaml"
+    path.write_text(yaml.safe_dump(MESSAGE))
+    found = read_table(path, joints=["b", "a"])
+    assert (found.joints, found.names) == (("b", "a"), ("t", "q1", "q2", "qd1", "qd2", "qdd1", "qdd2"))
+    assert found.columns[1].tolist() == [1.5, 1.5, 0.5, 0.2, 0.1, 2.0, 1.0]
+    alone = read_table(path, joints=["b"])
+    assert (alone.names, alone.columns[1].tolist()) == (("t", "q1", "qd1", "qdd1"), [1.5, 1.5, 0.2, 2.0])
+    with pytest.raises(InputError, match="there is no joint 'c'"):
+        read_table(path, joints=["b", "c"])

@@ -198,7 +198,9 @@ def plot(
     files = [*([str(source)] if plan is None else []), *map(str, over)]
     wanted = None if quantities is None else parse_quantities(",".join(quantities))
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
-        picture = picture_of(plan, [read_table(name) for name in files], wanted, tuple(joints))
+        known = None if plan is None else plan.loaded.robot.joint_names
+        tables = [read_table(name, joints=known) for name in files]
+        picture = picture_of(plan, tables, wanted, tuple(joints))
         content = rendered(picture, kind)
     with whole_file(str(output)) as out:
         out.write(content)

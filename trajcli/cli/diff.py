@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from trajcli.cli.outcome import error_as_json, print_json, print_lines, report_error
 from trajcli.comparison.difference import as_json, compare, describe, parse_tolerances
 from trajcli.errors import InputError, TrajcliError
-from trajcli.streams.reading import is_log, motion_files, read_table
+from trajcli.streams.reading import is_log, motion_files, read_table, with_joints
 from trajcli.streams.whole_file import is_folder, kind_of
 
 if TYPE_CHECKING:
@@ -70,8 +70,13 @@ def _compared(
     """Return how two files compare, for programs and for people."""
     if options.topic is not None and not (is_log(a) or is_log(b)):
         raise InputError("--topic is about MCAP, and neither file is one", hint="leave --topic out")
-    tables = read_table(a, options.topic), read_table(b, options.topic)
-    difference = compare(*tables, *tolerances, resample=options.resample)
+    first, second = read_table(a, options.topic), read_table(b, options.topic)
+    if first.joints is not None and second.joints is not None:
+        if set(first.joints) != set(second.joints):
+            names = f"{', '.join(first.joints)}; {second.file} has {', '.join(second.joints)}"
+            raise InputError(f"the files are of different joints: {first.file} has {names}")
+        second = with_joints(second, first.joints)
+    difference = compare(first, second, *tolerances, resample=options.resample)
     return as_json(difference), describe(difference)
 
 

@@ -47,7 +47,7 @@ class JointNames(_OfFirstRow):
     """Names of joints that are not empty, unique, and those of the robot, none left out."""
 
     def _judge(self, rows: RecordedMotion) -> None:
-        names, required = rows.joints, self.around.joints
+        names, required = rows.message_joints or rows.joints, self.around.joints
         if names is None:
             self.unjudged = "the file names no joints"
             return
@@ -64,7 +64,7 @@ class JointNames(_OfFirstRow):
 
     def _note(self, rows: RecordedMotion, joint: int | None, message: str, hint: str | None) -> None:
         fields = {"kind": "position", "value": 1.0, "limit": 0.0, "message": message, "hint": hint}
-        self.note(rows, joint, 0, 1.0, fields)
+        self.note(rows, None if rows.message_joints else joint, 0, 1.0, fields)
 
 
 class JointCount(_OfFirstRow):

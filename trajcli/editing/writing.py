@@ -47,7 +47,7 @@ def write_motion(motion: EditedMotion, path: str | None, form: FormatName | None
     if chosen.name == "CSV":
         with standard_output() if path in (None, "-") else whole_file(str(path)) as out:
             write_table(motion, out)
-        return ()
+        return _note_of_names(motion)
     options, notes = _options(motion, chosen)
     columns = _si_columns(motion, chosen)
     rows = _si_rows(motion, columns) if chosen.content != "knots" else iter(())
@@ -178,7 +178,7 @@ def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tu
     """Return what a format needs beside rows, and what it makes up or leaves out."""
     if form.content == "rows":
         lost = ("the columns of efforts are left out: the format has none",) * (motion.rows.tau is not None)
-        return WriteOptions(), lost
+        return WriteOptions(), (*lost, *_note_of_names(motion))
     missing = [name for name in ORDERS[1:3] if name not in motion.quantities]
     notes = [f"no column {name}: it is of the curve through the rows" for name in missing]
     notes += [
@@ -191,6 +191,12 @@ def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tu
         return WriteOptions(goal=lambda: Goal(motion.joint_names, knots)), tuple(notes)
     recording = _recording(motion, knots)
     return WriteOptions(recording=lambda: recording), tuple(notes)
+
+
+def _note_of_names(motion: EditedMotion) -> tuple[str, ...]:
+    """Return that rows number the joints which a message names; nothing of other files."""
+    named = motion.format in ("ros", "mcap") and motion.rows.joints
+    return (f"columns number the joints: {', '.join(named)}",) if named else ()
 
 
 def _knots(motion: EditedMotion) -> Knots:

@@ -59,7 +59,7 @@ def scene_of_file(
         FileError: When a file cannot be read.
     """
     robot = None if robot_name is None else open_sheet(robot_name).robot
-    table = read_table(source)
+    table = read_table(source, joints=None if robot is None else robot.joint_names)
     columns = [parse_column(name) for name in table.names]
     times = _times(table)
     values = _joint_values(table, columns, robot)

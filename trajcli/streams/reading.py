@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from trajcli.errors import InputError, utf8
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, TextRows, TimedRows, in_columns
+from trajcli.streams.recorded.column_roles import NamedFile, assign_roles, ordered_joints
+from trajcli.streams.row_sources import (
+    EXACT,
+    ArrayRows,
+    RowSource,
+    TextRows,
+    TimedRows,
+    in_columns,
+    unplaced,
+)
 from trajcli.streams.table import Table, joined_blocks
 from trajcli.streams.whole_file import is_folder, is_special, kind_of, paths_below
 
@@ -39,7 +49,9 @@ _OTHERS = {
 """Files that are known by their first bytes and are not read: what they are, and what would be read."""
 
 
-def read_table(path: str | Path | ByteSource, topic: str | None = None) -> Table:
+def read_table(
+    path: str | Path | ByteSource, topic: str | None = None, joints: Sequence[str] | None = None
+) -> Table:
     """Read all rows of a file: CSV, JSON lines, MCAP, arrays of numpy, or a ROS message in YAML.
 
     What is no CSV file has the columns of one in SI: t, q1.., qd1.., qdd1..
@@ -47,10 +59,11 @@ def read_table(path: str | Path | ByteSource, topic: str | None = None) -> Table
     Args:
         path: The file; "-" is standard input. An opened one is read from its first byte on.
         topic: Of MCAP, the topic; /joint_states unless given. Other files have none.
+        joints: Names of the joints that are wanted, in their order; those of messages are put into it.
 
     Raises:
         FileError: When it cannot be read.
-        InputError: When it is no such file, or has no such topic.
+        InputError: When it is no such file, has no such topic, or lacks a joint.
     """
     source = path if isinstance(path, ByteSource) else ByteSource(path)
     of_log = topic is not None and format_of_rows(source) == "mcap"
@@ -58,8 +71,30 @@ def read_table(path: str | Path | ByteSource, topic: str | None = None) -> Table
     every = range(len(rows.named.names))
     columns = joined_blocks(rows.blocks(every, ()))
     decimals = rows.decimals(every)
+    shown = np.where(decimals == EXACT, _ALL_DECIMALS, decimals)
+    table = Table(rows.named.names, columns, shown, rows.named.file, rows.joint_names)
+    return table if joints is None else with_joints(table, joints)
+
+
+def with_joints(table: Table, joints: Sequence[str]) -> Table:
+    """Return a table with its joints in another order, by their names where it says them.
+
+    Raises:
+        InputError: When it has other joints.
+    """
+    if table.joints is None:
+        return table
+    named = NamedFile(table.file, table.names, unplaced)
+    roles = assign_roles(named)
+    order, names, _ = ordered_joints(named, roles, table.joints, joints)
+    taken = [roles.time, *(found[joint] for found in roles.joints.values() for joint in order)]
+    numbered = [roles.time, *(k for found in roles.joints.values() for k in found[: len(order)])]
     return Table(
-        rows.named.names, columns, np.where(decimals == EXACT, _ALL_DECIMALS, decimals), rows.named.file
+        tuple(table.names[k] for k in numbered),
+        table.columns[:, taken],
+        table.decimals[taken],
+        table.file,
+        names,
     )
 
 

@@ -14,7 +14,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import JointType
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
-from trajcli.streams.recorded.column_names import MOVE
+from trajcli.streams.recorded.column_names import MOVE, read_name
 from trajcli.streams.recorded.column_roles import ColumnRoles, assign_roles, note_of_unread, ordered_joints
 from trajcli.streams.recorded.column_units import (
     ColumnScales,
@@ -30,6 +30,7 @@ from trajcli.units import Units
 Names = tuple[str, ...] | None
 _STATES = ("q", "qd", "qdd")
 _LARGEST = 1e100  # of a number in a file, in whatever unit
+_LAST_MOVE = 2.0**53  # a whole number from there on is none that a float64 tells from the next
 _KEPT = 1 << 23  # numbers that are kept in memory; of a longer file rows are read anew
 
 BLOCK_ROWS = 65536
@@ -78,6 +79,7 @@ class RecordedMotion:
         resolution: Of the whole file.
         source: Name of the file, for messages.
         first_row: Number of the first of these rows, from 1, a line of names not counted.
+        message_joints: Names of all joints of a ROS message, also of those that are left out; None elsewhere.
     """
 
     t: Array
@@ -91,6 +93,7 @@ class RecordedMotion:
     resolution: Resolution
     source: str
     first_row: int = 1
+    message_joints: tuple[str, ...] | None = None
 
 
 @comparable
@@ -151,6 +154,8 @@ class MotionFile:
         self._joints = {key: [at[found[joint]] for joint in order] for key, found in roles.joints.items()}
         self._factors = scales.factors[list(self._taken)]
         self._per_second = scales.per_second
+        self._bounds = np.full(len(self._taken), _LARGEST)
+        self._bounds[[] if self._move is None else self._move] = _LAST_MOVE
         self.source, self.format, self.joints = rows.named.file, rows.format, names
         self.columns = {
             key: tuple(rows.named.names[found[joint]] for joint in order)
@@ -158,6 +163,7 @@ class MotionFile:
         }
         self.quantities = (*roles.joints, *((MOVE,) if self._move is not None else ()))
         self.unread = roles.rest
+        self._message_joints = rows.joint_names if rows.format == "ros" else None
         self.notes = (*rows.notes, *note_of_unread(roles.rest), *scales.notes)
         self._kept: list[Array] | None = []
         self._read_all(scales)
@@ -170,7 +176,7 @@ class MotionFile:
             if scales.open:
                 self._refuse_open(scales.open, block)
             everywhere.add(block)
-            if everywhere.largest.max() > _LARGEST:
+            if (everywhere.largest > self._bounds).any():
                 self._refuse_far(block)
             fit.add(block[:, self._time] / self._per_second)
             self.rows += len(block)
@@ -184,7 +190,7 @@ class MotionFile:
 
     def _refuse_far(self, block: Array) -> NoReturn:
         """Refuse a number that no motion has, and that overflows wherever it is used."""
-        row, column = np.argwhere(np.abs(block) > _LARGEST)[0].tolist()
+        row, column = np.argwhere(np.abs(block) > self._bounds)[0].tolist()
         name = self._rows.named.names[self._taken[column]]
         message = f"{name} is {block[row, column]:.6g} in row {self.rows + row + 1}"
         raise self._rows.named.wrong(message, "check its exponent", name)
@@ -245,6 +251,7 @@ class MotionFile:
             self.resolution,
             self.source,
             first,
+            self._message_joints,
         )
 
     def _resolution(self, everywhere: ColumnExtents) -> Resolution:
@@ -348,10 +355,11 @@ def motion_of(
         InputError: When they are no motion.
     """
     said = parse_units(units)
-    roles = assign_roles(rows.named, columns, joints)
+    own = rows.format != "npy" and is_own_language(rows.named.names)
+    numbered = own and any(read_name(name).quantity == "q" for name in rows.named.names)
+    roles = assign_roles(rows.named, columns, None if numbered else joints)
     names = rows.joint_names or roles.joint_names
     order, ordered, notes = ordered_joints(rows.named, roles, names, joints)
-    own = rows.format != "npy" and is_own_language(rows.named.names)
     plain = Units() if rows.si or own else None
     types = None if joint_types is None else _by_file(joint_types, order, len(roles.joints["q"]))
     other = None if rows.si else declared  # messages are in SI, whatever a job says

@@ -30,12 +30,14 @@ class Table:
         columns: Shape (N, m), N >= 1, in the units that the names say.
         decimals: Shape (m,): the most decimals that any value of a column shows; what the file rounds to.
         file: Its name, for messages.
+        joints: Names of the joints 1, 2, ... of a message; None where it says none.
     """
 
     names: tuple[str, ...]
     columns: Array
     decimals: NDArray[np.int64]
     file: str
+    joints: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("columns", "decimals"):

@@ -148,9 +148,9 @@ class _Assignment:
         self._chosen: dict[str, ColumnGroup] = {}
 
     def _read(self, text: str) -> ColumnName:
-        plain, unit = split_unit(text)
-        if plain in self._joints:
-            return ColumnName(text, "q", plain, unit, "", "*")
+        for plain, unit in ((text, None), split_unit(text)):
+            if plain in self._joints:
+                return ColumnName(text, "q", plain, unit, "", "*")
         return read_name(text)
 
     def roles(self) -> ColumnRoles:
@@ -182,8 +182,9 @@ class _Assignment:
             read = self._names[index]
             own: int | str = len(group) + 1 if read.joint is None else read.joint
             own = self._number_of(read.text, value) if read.quantity is None else own
-            group[own if joint is None else joint] = index
-            self._names[index] = replace(read, quantity=quantity, unit=split_unit(value)[1] or read.unit)
+            self._take(group, own if joint is None else joint, index)
+            unit = read.unit if value == read.text else split_unit(value)[1] or read.unit
+            self._names[index] = replace(read, quantity=quantity, unit=unit)
         self._chosen.setdefault(quantity, {}).update(group)
 
     def _columns_of(self, value: str, *, single: bool) -> list[int]:
@@ -223,9 +224,17 @@ class _Assignment:
             if read.quantity != quantity or read.joint is None or index in taken:
                 continue
             if isinstance(read.joint, int) or not numbered or read.joint in self._joints:
-                groups.setdefault((read.kind, read.stem), {})[read.joint] = index
+                self._take(groups.setdefault((read.kind, read.stem), {}), read.joint, index)
         whole = {key: group for key, group in groups.items() if key[0] not in _BESIDE}
         return whole or groups
+
+    def _take(self, group: ColumnGroup, joint: int | str, index: int) -> None:
+        """Put a column into a group; refused where it has one of the joint."""
+        if joint in group:
+            names = [self._file.names[k] for k in (group[joint], index)]
+            hint = "leave one out, or name a column for each joint: --columns q1=NAME,q2=NAME"
+            raise self._file.wrong(f"two columns are of one joint: {', '.join(names)}", hint, names[1])
+        group[joint] = index
 
     def _positions(self) -> ColumnGroup:
         if "q" in self._chosen:
@@ -396,6 +405,9 @@ def ordered_joints(
         InputError: When the file has other joints, or another number of them.
     """
     count = len(roles.joints["q"])
+    doubled = next((name for index, name in enumerate(names or ()) if name in (names or ())[:index]), None)
+    if doubled is not None:
+        raise file.wrong(f"there are two joints '{doubled}'", "a joint has one name, which stands once")
     everything = list(range(count))
     if wanted is None:
         return everything, None if names is None else tuple(names), ()
