@@ -60,6 +60,8 @@ def test_a_message_keeps_the_names_of_joints_that_are_left_out(tmp_path: Path) -
     motion = opened(tmp_path, message("a, finger, b", "1.0, 2.0, 3.0"), ["b", "a"]).whole()
     assert (motion.q.tolist(), motion.joints) == ([[3.0, 1.0]], ("b", "a"))
     assert motion.message_joints == ("a", "finger", "b")
+    renamed = opened(tmp_path, message("x, y", "1.0, 2.0"), ["b", "a"]).whole()
+    assert (renamed.q.tolist(), renamed.joints, renamed.message_joints) == ([[1.0, 2.0]], ("b", "a"), None)
 
 
 @pytest.mark.parametrize("move", ["1e30", "-1e17"])
