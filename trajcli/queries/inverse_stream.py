@@ -259,7 +259,7 @@ class _Follower:
     def _continued(self, row: int, last: Array) -> Array | None:
         """Return the answer (1, n) that Newton's steps find near to the row before; None where they fail."""
         robot, target = self._arm.robot, self._target.rows([row])
-        joints, converged = descend(robot, target, last[None], robot.limits.position)
+        joints, converged = descend(robot, target, last[None], robot.limits.position, self._tolerance)
         close = np.abs(joints - last).max() <= _CLOSE
         inside = (beyond(joints, robot.limits.position) == 0.0).all()
         met = converged[0] and closure_of(target, forward(robot, joints)).max() <= self._tolerance

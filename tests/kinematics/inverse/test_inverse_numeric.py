@@ -82,6 +82,24 @@ def test_any_chain_of_six_joints_is_solved(convention):
         solved += 1
 
 
+@pytest.mark.parametrize(("decimals", "tolerance"), [(9, 1e-9), (5, 1e-4)])
+def test_an_arm_of_five_joints_reaches_its_own_poses_as_they_are_written(decimals, tolerance):
+    """Rounded to some decimals they are out of its reach, by no more than the tolerance."""
+    rng = np.random.default_rng(3)
+    robot = random_arm(rng, 5, "standard")
+    joints = rng.uniform(-1.5, 1.5, (3, 5))
+    poses = np.round(forward(robot, joints), decimals)
+    found = solve(robot, poses, joints, tolerance)
+    assert found.valid.any(axis=1).all()
+    off = np.abs(forward(robot, found.joints) - poses[:, None])
+    assert off[found.valid].max() <= tolerance
+    nearest = np.abs(found.joints - joints[:, None]).max(axis=2).min(axis=1)
+    assert nearest.max() < 100 * tolerance
+    beyond = poses.copy()
+    beyond[:, :3, 3] += 30 * tolerance
+    assert not solve(robot, beyond, joints, tolerance).valid.any()
+
+
 def test_one_joint_alone_is_solved():
     robot = Robot("crank", (Joint("j1", a=0.3),), unlimited(1), "standard", np.eye(4), np.eye(4))
     found = solve(robot, forward(robot, [1.1]))

@@ -28,9 +28,10 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import FULL, revolute
 from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
-from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, residuals
+from trajcli.kinematics.inverse.target import IkTarget, closure_of, residual_jacobian, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 
@@ -102,14 +103,19 @@ def refined(robot: Robot, target: IkTarget, q: Array, iterations: int) -> tuple[
     return q, errors, slopes
 
 
-def descend(robot: Robot, target: IkTarget, q: Array, bounds: Array | None) -> tuple[Array, Flags]:
+def descend(
+    robot: Robot, target: IkTarget, q: Array, bounds: Array | None, tolerance: float = 0.0
+) -> tuple[Array, Flags]:
     """Return joint values (K, n) after the search from seeds (K, n), and which met their targets.
+
+    An arm with fewer joints than coordinates meets no rounded target to its last digit.
 
     Args:
         robot: The arm.
         target: A flat batch of K.
         q: The seeds.
         bounds: Limits (n, 2) that hold the joints while searching; None for none.
+        tolerance: By how much such an arm may miss its targets, m and rad.
     """
     result, met = q.copy(), np.zeros(len(q), dtype=bool)
     running = np.arange(len(q))
@@ -126,22 +132,30 @@ def descend(robot: Robot, target: IkTarget, q: Array, bounds: Array | None) -> t
         longest = np.abs(step).max(axis=1, keepdims=True)
         values = values + step * np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
         result[running] = values if bounds is None else np.clip(values, bounds[:, 0], bounds[:, 1])
+    if len(robot.joints) < target.coordinates:
+        met |= closure_of(target, forward(robot, result)).max(axis=1) <= tolerance
     return result, met
 
 
-def search(robot: Robot, target: IkTarget, near: Array | None) -> SearchResult:
-    """Return where all seeds lead to for flat targets (N); `near` (N, n) is the first seed where given."""
+def search(robot: Robot, target: IkTarget, near: Array | None, tolerance: float = 0.0) -> SearchResult:
+    """Return where all seeds lead to for flat targets (N); `near` (N, n) is the first seed where given.
+
+    The tolerance is that of `descend`.
+    """
     count, joints = target.poses.shape[0], len(robot.joints)
     seeds = SEEDS if joints > target.coordinates else SEEDS_OF_ALL
     result, met = np.zeros((count, seeds, joints)), np.zeros((count, seeds), dtype=bool)
     for low in range(0, count, _BLOCK):
         block = np.arange(low, min(low + _BLOCK, count))
-        some = _search_block(robot, target.rows(block), None if near is None else near[block], seeds)
+        nearby = None if near is None else near[block]
+        some = _search_block(robot, target.rows(block), nearby, seeds, tolerance)
         result[block], met[block] = some.joints, some.met
     return SearchResult(result, met)
 
 
-def _search_block(robot: Robot, target: IkTarget, near: Array | None, seeds: int) -> SearchResult:
+def _search_block(
+    robot: Robot, target: IkTarget, near: Array | None, seeds: int, tolerance: float
+) -> SearchResult:
     count, joints = target.poses.shape[0], len(robot.joints)
     bounds = robot.limits.position if joints > target.coordinates else None
     result, met = np.zeros((count, seeds, joints)), np.zeros((count, seeds), dtype=bool)
@@ -155,7 +169,7 @@ def _search_block(robot: Robot, target: IkTarget, near: Array | None, seeds: int
         if near is not None:
             starts[:, 0] = near[missing]
         pairs = np.repeat(missing, seeds)
-        values, hits = descend(robot, target.rows(pairs), starts.reshape(-1, joints), bounds)
+        values, hits = descend(robot, target.rows(pairs), starts.reshape(-1, joints), bounds, tolerance)
         result[missing] = values.reshape(-1, seeds, joints)
         met[missing] = hits.reshape(-1, seeds)
     return SearchResult(result, met)

@@ -46,7 +46,7 @@ def by_search(
     robot: Robot, method: IkMethod, target: IkTarget, near: Array | None, tolerance: float
 ) -> Answers:
     """Return the nearest answers of a search; of self-motion manifolds their nearest points."""
-    searched, freedom = search(robot, target, near), freedom_of(robot, target)
+    searched, freedom = search(robot, target, near, tolerance), freedom_of(robot, target)
     # from (N, seeds, n) to (n, seeds, N), and from (N, seeds) to (seeds, N)
     joints = np.ascontiguousarray(np.moveaxis(searched.joints, 0, -1).swapaxes(0, 1))
     valid = searched.met.T & (closures(robot, target, joints).max(axis=0) <= tolerance)
