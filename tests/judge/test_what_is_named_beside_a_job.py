@@ -258,3 +258,63 @@ def test_a_file_lasts_as_long_as_the_plan_within_the_rounding_of_its_stamps(
     job = TWO_MOVES.replace("duration: 1,", f"duration: {lasts - 0.3:.4f},")
     notes = checked(tmp_path, job, ["t,q1,q2", *rows]).judgement.notes
     assert any("no column `move`" in note for note in notes) is not named
+
+
+def constant_speeds(speeds: Sequence[float], moves: Sequence[int]) -> list[str]:
+    """Return rows 0.1 s apart in which the second joint goes at so many rad/s in each of some moves, for 1 s."""
+    q2 = np.append(0.0, np.cumsum(np.repeat(speeds, 10) * 0.1))
+    of_rows = np.append(np.repeat(moves, 10), moves[-1])
+    return [
+        "t,q1,q2,move",
+        *(f"{0.1 * k:.9f},0,{q:.9f},{move}" for k, (q, move) in enumerate(zip(q2, of_rows, strict=True))),
+    ]
+
+
+NO_PLAN = """\
+version: 1
+robot: {joints: 2}
+limits: {velocity: 3, acceleration: 50}
+start: {joints: [0, 0]}
+moves:
+  - {planner: quintic, to: {joints: [0, 1]}, duration: 1, limits: {velocity: [3, 0.5]}}
+  - {planner: quintic, to: {joints: [0, 2]}, duration: 1}
+  - {planner: trapezoid, to: {joints: [0, 9]}, duration: 0.01}
+"""
+
+
+def test_without_a_plan_limits_of_single_moves_count(tmp_path: Path) -> None:
+    """Its first move allows its second joint 0.5 rad/s, its last has no law."""
+    judgement = checked(tmp_path, NO_PLAN, constant_speeds([0.4, 0.6], [0, 1])).judgement
+    assert not judgement.findings
+    judgement = checked(tmp_path, NO_PLAN, constant_speeds([0.6, 0.6], [0, 1])).judgement
+    fast = [(each.move, each.joint, each.limit) for each in judgement.findings if each.kind == "velocity"]
+    assert fast == [(0, "j2", 0.5)]
+
+
+def test_without_a_plan_what_a_tool_carries_counts(tmp_path: Path) -> None:
+    """Held at rest a UR5e stretched forward bears itself, and not 12 kg more: gravity alone takes 178 N m."""
+    job = """\
+version: 1
+robot: ur5e
+limits: {acceleration: 10, effort: robot}
+start: {joints: [0, 0, 0, 0, 1.5, 0]}
+moves:
+  - {planner: hold, duration: 1}
+  - {attach: {mass: 12, com: [0, 0, 0.08]}}
+  - {planner: hold, duration: 1}
+"""
+    names = ",".join(f"{name}{joint}" for name in ("q", "qd", "qdd") for joint in range(1, 7))
+    rows = [f"{0.1 * k:.1f},0,0,0,0,1.5,0,{'0,' * 12}{0 if k < 10 else 2}" for k in range(21)]
+    judgement = checked(tmp_path, job, [f"t,{names},move", *rows]).judgement
+    assert any("the job has no plan" in note for note in judgement.notes)
+    efforts = [(each.move, each.joint) for each in judgement.findings if each.kind == "effort"]
+    assert efforts == [(2, "shoulder_lift_joint")]
+
+
+@pytest.mark.parametrize(("moves", "said"), [([0, 1], None), ([1, 7], "7"), ([8, 9], "8, 9")])
+def test_moves_that_the_job_does_not_have_are_named(
+    moves: list[int], said: str | None, tmp_path: Path
+) -> None:
+    notes = checked(tmp_path, TWO_MOVES, constant_speeds([0.1, 0.1], moves)).judgement.notes
+    assert [note for note in notes if f"no move {said}:" in note] == [n for n in notes if "no move" in n]
+    assert any("no move" in note for note in notes) is (said is not None)

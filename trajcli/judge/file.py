@@ -419,7 +419,8 @@ def _requirements(
 ) -> Requirements:
     tool = _tool_of(given)
     if given.plan is None or given.loaded is None:
-        return Requirements(given.robot, interpolate=options.interpolate, tool=tool, consumer=consumer)
+        arms = {} if given.loaded is None else _arms_of(given.loaded)
+        return Requirements(given.robot, arms, options.interpolate, tool=tool, consumer=consumer)
     trajectory = given.plan.trajectory
     last = trajectory.curve.evaluate(trajectory.curve.end, 2, side="left")
     kept = (
@@ -436,6 +437,21 @@ def _requirements(
         tool,
         consumer,
     )
+
+
+def _arms_of(loaded: LoadedJob) -> dict[int, Robot]:
+    """Return the arm of each move of a job that has no plan, with the limits in force and what it carries.
+
+    Raises:
+        InputError: When a limit of a move is looser than the job's.
+    """
+    from trajcli.job.limits import with_move_limits
+
+    arms, robot = {}, loaded.robot
+    for index, planner in enumerate(loaded.job.moves):
+        robot = planner.equipped(robot)
+        arms[index] = with_move_limits(robot, planner.limits, index)
+    return arms
 
 
 def _tolerances(word: str | None, robot: Robot, units: Units) -> list[float]:

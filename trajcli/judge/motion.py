@@ -35,6 +35,7 @@ _EXACT = 4.0  # units in the last place of a length between exact stamps
 _SEEN = 1e-9  # of the period: stamps that are moved by less are as they were
 _MOST = 9  # intervals of one period for each longer one: then a longer one is a hole
 _STANDS = 1.0  # s: any length will do
+_NAMED = 5  # moves that the job does not have
 _FAR_OVER = 3.0  # times a limit of a rate: degrees are 57 times as large as radians
 _TURNS = 4.0 * np.pi  # rad: no joint goes there, and degrees read as radians do
 
@@ -144,6 +145,7 @@ class MotionJudge:
         self._source: str | None = None
         self._tool = None if requirements.tool is None else requirements.tool()
         self._consumer = None if requirements.consumer is None else requirements.consumer()
+        self._of_no_move = set[int]()
 
     def see(self, block: RecordedMotion) -> None:
         """Judge more rows.
@@ -199,6 +201,12 @@ class MotionJudge:
         if self._regular >= _MOST * sum(finding.count for finding in holes):
             findings += holes
         notes = [*_note_on_stamps(stamps), *(() if self._tool is None else self._tool.notes)]
+        if self._of_no_move:
+            numbers = ", ".join(map(str, sorted(self._of_no_move)[:_NAMED]))
+            notes.append(
+                f"the job has no move {numbers}: such rows are judged by what it says of all moves alone, "
+                "without limits, paths and payloads of single ones"
+            )
         if self._consumer is not None:
             of_consumer, unjudged = self._consumer.result()
             findings, notes = [*findings, *of_consumer], [*notes, *unjudged]
@@ -259,6 +267,8 @@ class MotionJudge:
         flips = None if self._tool is None else self._tool.changes_branch
         asked = self._requirements.interpolate is not None or self._requirements.planned
         for (before, after), low, high in window.runs():
+            if self._requirements.by_move:
+                self._of_no_move |= {before, after} - self._requirements.by_move.keys() - {-1}
             robot, pieces = self._requirements.robot_between(before, after), slice(low, high)
             arguments = (window, pieces, robot.limits, before, self._axes, self._worst)
             carries_one = self._requirements.carries_one(before, after)
