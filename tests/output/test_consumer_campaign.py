@@ -19,7 +19,8 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import InputError, PlanningError, VerificationError
 from trajcli.grids import KnotGrid, UniformGrid
 from trajcli.job.read import job_from_text
-from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
+from trajcli.output.consumer import job_for
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, plan_for
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.formats import FORMATS
 

@@ -21,7 +21,8 @@ from trajcli.curves.operations import scale_time
 from trajcli.errors import VerificationError
 from trajcli.grids import KnotGrid, UniformGrid
 from trajcli.job.read import job_from_text, load_job
-from trajcli.output.delivery.for_consumer import ForConsumer, Writing, job_for, plan_for
+from trajcli.output.consumer import job_for
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, plan_for
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.delivery.stretched_moves import StretchedMoves
 from trajcli.output.write import grid_of

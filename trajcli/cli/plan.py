@@ -136,7 +136,7 @@ def _wanted(loaded: LoadedJob, options: PlanCommand) -> tuple[LoadedJob, Profile
     """Return the job as the consumer takes its rows that the command line, or it, names; and what that is."""
     if options.consumer is None and loaded.job.output.consumer is None:
         return None
-    from trajcli.output.delivery.for_consumer import job_for
+    from trajcli.output.consumer import job_for
 
     kept = {"rate": options.rate is not None, "rows": options.rows is not None}
     return job_for(loaded, options.consumer, kept)

@@ -1,18 +1,20 @@
-"""Judgement of a plan by the rules of its consumer: of its rows as they are written."""
+"""Rows of a plan as its consumer takes them, and their judgement by its rules, as they are written."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from trajcli.consumers.judgement import ProfileJudgement, judge_by_profile
+from trajcli.consumers.judgement import ProfileJudgement, judge_by_profile, load_profile
 from trajcli.consumers.profile import Profile
 from trajcli.consumers.rule_check import Surroundings
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.grids import Grid
+from trajcli.job.read import LoadedJob
 from trajcli.job.reports.comparisons import ConsumerFinding, ConsumerReport, UnjudgedRule
 from trajcli.output.write import write_rows
 from trajcli.planning.plan import Plan
@@ -22,6 +24,56 @@ from trajcli.streams.formats import ENDINGS, FORMATS, StreamFormat
 
 if TYPE_CHECKING:
     from trajcli.output.recording import LogOptions
+
+
+def job_for(loaded: LoadedJob, name: str | None, kept: Mapping[str, bool]) -> tuple[LoadedJob, Profile, str]:
+    """Return a job whose output is as a consumer takes it, the consumer, and what it brought.
+
+    Args:
+        loaded: The job.
+        name: Of its profile, from the command line, where it goes before what the job says of its rows; None
+            for that of the job, which goes behind.
+        kept: Of `rate` and `rows`: whether the command line gives it.
+
+    Raises:
+        InputError: When there is no such profile, or it takes rows at another rate.
+    """
+    output = loaded.job.output
+    try:
+        profile = load_profile(name or output.consumer or "")
+    except InputError as error:
+        raise error if name else error.located(place=loaded.document.place(("output", "for"))) from None
+    wanted, given = profile.rows, output.model_fields_set
+    stays = {key: kept.get(key, False) if name else key in given for key in ("rate", "rows")}
+    changed: dict[str, Any] = {"consumer": profile.name}
+    if wanted.rate is not None:
+        _refuse_other_rows(loaded, profile, stays)
+        changed |= {"rate": wanted.rate, "times": None, "rows": "rate"}
+    elif name and not stays["rows"]:
+        changed["rows"] = None
+    if wanted.align and (name or "align" not in given):
+        changed |= {"align": True, "times": None}
+    if name or "columns" not in given:
+        changed["columns"] = wanted.columns
+    other = output.model_copy(update=changed)
+    brought = f"{profile.name} takes {profile.rows.words}"
+    differs = {key for key in changed if key in given and getattr(output, key) != changed[key]}
+    said = f"{brought}: that goes before `output` of the job" if differs - {"consumer"} else ""
+    return replace(loaded, job=loaded.job.model_copy(update={"output": other})), profile, said
+
+
+def _refuse_other_rows(loaded: LoadedJob, profile: Profile, stays: Mapping[str, bool]) -> None:
+    """Refuse rows at other times than those of a consumer with a rate of its own."""
+    output, rate = loaded.job.output, profile.rows.rate
+    wrong = ("rate", f"{output.rate:g} Hz") if stays["rate"] and output.rate != rate else None
+    if stays["rows"] and output.rows in ("knots", "both"):
+        wrong = "rows", f"`rows: {output.rows}`"
+    if wrong is not None:
+        key, what = wrong
+        text = f"{profile.name} takes rows at {rate:g} Hz, and {what} is asked for"
+        raise InputError(text, hint=f"leave the {key} out").located(
+            place=loaded.document.place(("output", key))
+        )
 
 
 def judge_as_written(

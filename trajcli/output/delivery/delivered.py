@@ -49,7 +49,8 @@ def delivered(
             form = form or DEFAULT
             _refuse_events(with_event(plan, joined_rows(plan, grid_of(plan), form, "fixed"), form)[0])
         return plan, "fixed"
-    from trajcli.output.delivery.for_consumer import Writing, job_for, plan_for, refusal
+    from trajcli.output.consumer import job_for
+    from trajcli.output.delivery.for_consumer import Writing, plan_for, refusal
     from trajcli.streams.formats import DEFAULT
 
     made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form or DEFAULT), carried)

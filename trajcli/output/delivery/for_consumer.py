@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from trajcli.consumers.judgement import ProfileJudgement, load_profile
+from trajcli.consumers.judgement import ProfileJudgement
 from trajcli.consumers.profile import Profile
-from trajcli.errors import InputError, TrajcliError, VerificationError
+from trajcli.errors import TrajcliError, VerificationError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.grids import Grid, KnotGrid, UniformGrid
@@ -96,6 +96,11 @@ class ForConsumer:
     said: tuple[str, ...] = ()
 
     @property
+    def duration(self) -> float:
+        """Of its motion, s."""
+        return self.plan.trajectory.duration
+
+    @property
     def over(self) -> tuple[Finding, ...]:
         """What keeps the rows from being written: limits, and necessary rules."""
         limits = () if self.joined is None else (f for f in self.joined.findings if f.limit)
@@ -148,56 +153,6 @@ class ForConsumer:
         cost = f"; {100 * longer:.2g} % longer than between the rows" if longer > _LONGER else ""
         bits = ", every bit of its numbers written" if self.digits == "full" and self.chosen else ""
         return f"{self.where}{bits}: joined as it will be{words}{cost}"
-
-
-def job_for(loaded: LoadedJob, name: str | None, kept: Mapping[str, bool]) -> tuple[LoadedJob, Profile, str]:
-    """Return a job whose output is as a consumer takes it, the consumer, and what it brought.
-
-    Args:
-        loaded: The job.
-        name: Of its profile, from the command line, where it goes before what the job says of its rows; None
-            for that of the job, which goes behind.
-        kept: Of `rate` and `rows`: whether the command line gives it.
-
-    Raises:
-        InputError: When there is no such profile, or it takes rows at another rate.
-    """
-    output = loaded.job.output
-    try:
-        profile = load_profile(name or output.consumer or "")
-    except InputError as error:
-        raise error if name else error.located(place=loaded.document.place(("output", "for"))) from None
-    wanted, given = profile.rows, output.model_fields_set
-    stays = {key: kept.get(key, False) if name else key in given for key in ("rate", "rows")}
-    changed: dict[str, Any] = {"consumer": profile.name}
-    if wanted.rate is not None:
-        _refuse_other_rows(loaded, profile, stays)
-        changed |= {"rate": wanted.rate, "times": None, "rows": "rate"}
-    elif name and not stays["rows"]:
-        changed["rows"] = None
-    if wanted.align and (name or "align" not in given):
-        changed |= {"align": True, "times": None}
-    if name or "columns" not in given:
-        changed["columns"] = wanted.columns
-    other = output.model_copy(update=changed)
-    brought = f"{profile.name} takes {profile.rows.words}"
-    differs = {key for key in changed if key in given and getattr(output, key) != changed[key]}
-    said = f"{brought}: that goes before `output` of the job" if differs - {"consumer"} else ""
-    return replace(loaded, job=loaded.job.model_copy(update={"output": other})), profile, said
-
-
-def _refuse_other_rows(loaded: LoadedJob, profile: Profile, stays: Mapping[str, bool]) -> None:
-    """Refuse rows at other times than those of a consumer with a rate of its own."""
-    output, rate = loaded.job.output, profile.rows.rate
-    wrong = ("rate", f"{output.rate:g} Hz") if stays["rate"] and output.rate != rate else None
-    if stays["rows"] and output.rows in ("knots", "both"):
-        wrong = "rows", f"`rows: {output.rows}`"
-    if wrong is not None:
-        key, what = wrong
-        text = f"{profile.name} takes rows at {rate:g} Hz, and {what} is asked for"
-        raise InputError(text, hint=f"leave the {key} out").located(
-            place=loaded.document.place(("output", key))
-        )
 
 
 def plan_for(
@@ -327,13 +282,38 @@ class _Search:
             if stretched or best is None:
                 best = self._best_of([*self._candidates(first)], first, stretched=stretched)
         best = self._stretched(first, best) or best
+        stops = self._with_stops() if self._loaded.job.names_zones else None
+        if stops is not None and not (best and best.duration < stops.duration):
+            text = f"{stops.where}: no motion through the zones is faster than one that stops at the corners"
+            return _with_event(stops, "not_faster", text)
         if best is None:
             return first
-        longer = best.plan.trajectory.duration / first.plan.trajectory.duration
+        if stops is not None and best.plan.flyby is not None:
+            flyby = replace(best.plan.flyby, stopping=stops.duration)
+            best = replace(best, plan=replace(best.plan, flyby=flyby))
+        longer = best.duration / first.duration
         if longer <= 1 + _LONGER:
             return _with_event(best, "for_consumer", f"{best.where}: its breaks fall on rows")
         text = f"{best.where}: stretched {longer:.6g} times so that its rows, joined, keep all limits"
         return _with_event(best, "slowed", text)
+
+    def _with_stops(self) -> ForConsumer | None:
+        """Return the motion that stops at all corners, where its rows keep all."""
+        from trajcli.planning.flown_job import FlyBy
+
+        job = self._loaded.job
+        loaded = replace(self._loaded, job=job.with_stops())
+        search = _Search(loaded, self._profile, self._writing, self._carried)
+        try:
+            first = search.first()
+            made = first if first.clean else search.slower(first)
+        except TrajcliError:
+            return None
+        if not made.keeps:
+            return None
+        loaded = replace(loaded, job=job.model_copy(update={"output": made.plan.loaded.job.output}))
+        flyby = FlyBy(made.duration, made.duration, made.duration, (), None)
+        return replace(made, plan=replace(made.plan, loaded=loaded, flyby=flyby))
 
     def _best_of(
         self, candidates: Sequence[tuple[LoadedJob, Adaptation]], first: ForConsumer, *, stretched: bool
