@@ -274,3 +274,31 @@ def test_chains_through_zones_are_searched_once_for_all_stretches(monkeypatch: p
     assert len(searched) == 3
     made = made_for("flying_cell", "ros-jtc")
     assert largest_share(made.plan, made.grid, 1e-4) <= 1 + 10 * WITHIN
+
+
+CORNER = {
+    "version": 1,
+    "robot": {"joints": 2},
+    "limits": {"velocity": 3, "acceleration": 8, "jerk": 300},
+    "start": {"joints": [0, 0]},
+    "when_over_limit": "slow",
+    "moves": [{"planner": "jerk_limited", "to": {"joints": to}} for to in ([0.5, 0.2], [0.2, 0.7])],
+    "output": {"rate": 500},
+}
+
+
+def test_a_motion_through_zones_is_no_slower_for_a_consumer_than_one_that_stops() -> None:
+    """Its quintics need rows at knots, which a motion that stops has on its phases of constant jerk."""
+    made, stopping = (
+        plan_for(*job_for(job_from_text(json.dumps(CORNER | {"zone": zone})), "ros-jtc", {}), Writing())
+        for zone in ({"joints": 0.05}, "stop")
+    )
+    assert made.keeps
+    assert made.plan.trajectory.duration <= stopping.plan.trajectory.duration * (1 + 1e-9)
+    assert made.plan.flyby is not None
+    assert made.plan.flyby.stopping == pytest.approx(stopping.plan.trajectory.duration, rel=1e-9)
+    kinds = {event.kind for event in made.plan.events}
+    assert ("not_faster" in kinds) == (not made.plan.flyby.zones)
+    assert made.plan.loaded.job.zone is not None
+    alone = [plan_job(job_from_text(json.dumps(CORNER | {"zone": {"joints": zone}}))) for zone in (0.05, 0.0)]
+    assert alone[0].trajectory.duration < 0.99 * alone[1].trajectory.duration, "between its rows it is faster"
