@@ -11,6 +11,8 @@ from streams.mcap.conftest import read_mcap
 
 from trajcli.columns import columns_of, parse_column
 from trajcli.curves.piecewise import Array
+from trajcli.editing.edited_motion import ReadingOptions, read_motion
+from trajcli.editing.writing import write_motion
 from trajcli.errors import InputError
 from trajcli.grids import UniformGrid
 from trajcli.job.read import job_from_text
@@ -121,6 +123,19 @@ def test_every_format_that_has_efforts_holds_them(plan: Plan, tmp_path: Path) ->
     assert [line["tau"] for line in lines] == tau.tolist()
     write_plan(plan, str(tmp_path / "plan.mcap"))
     assert np.array_equal(read_mcap(tmp_path / "plan.mcap").effort, tau)
+
+
+@pytest.mark.parametrize("ending", ["jsonl", "npz", "mcap"])
+def test_every_format_that_has_efforts_is_converted_with_them(
+    ending: str, plan: Plan, tmp_path: Path
+) -> None:
+    write_plan(plan, str(tmp_path / "plan.jsonl"))
+    motion = read_motion(str(tmp_path / "plan.jsonl"), ReadingOptions())
+    assert write_motion(motion, str(tmp_path / f"other.{ending}")) == ()
+    found = read_motion(str(tmp_path / f"other.{ending}"), ReadingOptions()).rows.tau
+    assert np.array_equal(np.asarray(found), rows_of(plan)[:, 7:9])
+    (lost,) = write_motion(motion, str(tmp_path / "goal.yaml"))
+    assert lost == "the columns tau are left out: the format is written without them"
 
 
 def test_a_log_has_efforts_only_where_they_are_asked_for(tmp_path: Path) -> None:

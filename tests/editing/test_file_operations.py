@@ -59,6 +59,8 @@ def test_reversed_derivatives_change_their_signs_in_turn(tmp_path: Path) -> None
         expected = (-1.0) ** order * rows[::-1, column]
         if name == "t":
             expected = 3.0 - rows[::-1, column]
+        if name == "move":  # the row of the border, at 2 s, is of the move that follows, as everywhere
+            expected = np.where(back[:, 0] < 2.0 - 1e-9, 1, 0)
         np.testing.assert_allclose(back[:, column], expected, atol=1e-9)
 
 
@@ -152,6 +154,48 @@ def test_motions_of_other_joints_or_columns_are_not_joined(tmp_path: Path) -> No
         join(one, read(few))
     with pytest.raises(InputError, match=r"has 2 joints, .* has 1"):
         join(one, read(stranger(tmp_path / "other.csv")))
+
+
+def moves_file(path: Path, q: list[float], move: list[int] | None) -> EditedMotion:
+    """Write rows 1 s apart, from the time on that the first position says."""
+    names, ends = ("t,q1", [""] * len(q)) if move is None else ("t,q1,move", [f",{each}" for each in move])
+    path.write_text(f"{names}\n" + "".join(f"{a:g},{a:g}{end}\n" for a, end in zip(q, ends, strict=True)))
+    return read(path)
+
+
+@pytest.mark.parametrize(
+    ("second", "expected"), [([0, 1, 1], [0, 0, 1, 1, 2, 3, 3]), ([1, 2, 2], [0, 0, 1, 1, 1, 2, 2])]
+)
+def test_moves_are_counted_on_except_where_one_goes_on(
+    second: list[int], expected: list[int], tmp_path: Path
+) -> None:
+    """The second file begins at the time when the first one ends; at another time it is never a part."""
+    first = moves_file(tmp_path / "first.csv", [0, 1, 2, 3, 4], [0, 0, 1, 1, 1])
+    other = moves_file(tmp_path / "second.csv", [4, 5, 6], second)
+    assert np.asarray(join(first, other).rows.move).tolist() == expected
+    late = other.with_rows(other.rows.t + 1, other.quantities, other.rows.move)
+    assert np.asarray(join(first, late).rows.move).tolist() == [0, 0, 1, 1, 2, 3, 3]
+
+
+def test_moves_that_the_second_file_does_not_have_are_said_to_be_lost(tmp_path: Path) -> None:
+    first = moves_file(tmp_path / "first.csv", [0, 1, 2], [0, 0, 0])
+    joined = join(first, moves_file(tmp_path / "second.csv", [2, 3], None))
+    assert joined.notes == (f"the column move is left out: {tmp_path / 'second.csv'} has none",)
+    assert table(written(joined, tmp_path / "both.csv"))[0] == ["t", "q1"]
+
+
+def test_columns_that_the_curve_does_not_take_have_no_rows_between_the_given_ones(tmp_path: Path) -> None:
+    """Efforts depend on loads, which change at once; jerks step. Given rows have them still."""
+    path = tmp_path / "rows.csv"
+    path.write_text("t,q1,qd1,qdd1,qddd1,tau1\n0,0,1,0,0,-40\n1,1,1,0,0,-40\n2,2,1,0,0,-95\n3,3,1,0,0,-95\n")
+    motion = read(path)
+    whole = ["t", "q1", "qd1", "qdd1", "qddd1", "tau1"]
+    for kept in (resample(motion, 1.0), resample(motion, 0.5), cut(motion, 1.0, 2.0)):
+        assert table(written(kept, tmp_path / "out.csv"))[0] == whole
+        assert kept.notes == ()
+    for made in (resample(motion, 2.0), cut(motion, 0.0, 1.5)):
+        assert table(written(made, tmp_path / "out.csv"))[0] == whole[:4]
+        assert made.notes == ("the columns qddd, tau are left out: nothing says them between rows",)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from motions_on_disk import JOB, planned, quintic, table
 
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
+from trajcli.editing.operations import cut
 from trajcli.editing.requirements import kept_limits
 from trajcli.editing.retiming import Stretch, retime
 from trajcli.editing.writing import as_read, write_motion
@@ -212,6 +213,74 @@ def test_rows_with_nine_decimals_verify_as_they_are_written(tmp_path: Path) -> N
         assert stretch.factor == pytest.approx(56.25 / velocity, rel=2e-4)
         write_motion(found, str(tmp_path / "out.csv"))
         assert verdict(tmp_path / "out.csv", arm) != "exceeded"
+
+
+LIMITED = JOB.replace("duration: 1}", "duration: 1, limits: {velocity: {base: 30}}}")
+"""Its first move peaks at 56.25 deg/s, the second one at 43.75 deg/s."""
+
+
+@pytest.mark.parametrize("ending", ["csv", "mcap"])
+def test_rows_without_moves_have_the_limits_of_the_moves_at_their_times(ending: str, tmp_path: Path) -> None:
+    """As for `trajcli check`; rows that last longer or shorter are of a move that nobody knows."""
+    (tmp_path / "job.yaml").write_text(LIMITED)
+    rows = planned(tmp_path / f"rows.{ending}", JOB.replace(", move", ""))
+    kept = kept_limits(str(tmp_path / "job.yaml"), None)
+    motion = read_motion(
+        str(rows), ReadingOptions(), joints=kept.robot.joint_names, joint_types=kept.robot.joint_types
+    )
+    _, (stretch,) = retime(kept.with_moves(motion), kept.requirements)
+    assert stretch.factor == pytest.approx(56.25 / 30, rel=2e-4)
+    found, stretches = retime(kept.with_moves(motion), kept.requirements, per_move=True)
+    assert [each.moves for each in stretches] == [(0,), (1,)]
+    write_motion(found, str(tmp_path / "out.csv"))
+    assert "move" not in table(tmp_path / "out.csv")[0]
+    assert found.rows.t[-1] == pytest.approx(56.25 / 30 + 2, rel=2e-4)
+    with pytest.raises(InputError, match="has no column `move` and does not last as long as the plan"):
+        retime(kept.with_moves(cut(motion, 0.0, 2.0)), kept.requirements)
+
+
+def test_rows_that_say_no_move_have_the_limits_that_all_moves_have(tmp_path: Path) -> None:
+    job = LIMITED.replace("duration: 2}", "duration: 2, limits: {velocity: {base: 30}}}")
+    (tmp_path / "job.yaml").write_text(job)
+    kept = kept_limits(str(tmp_path / "job.yaml"), None)
+    rows = planned(tmp_path / "rows.csv", JOB.replace(", move", ""))
+    motion = read_motion(
+        str(rows), ReadingOptions(), joints=kept.robot.joint_names, joint_types=kept.robot.joint_types
+    )
+    part = kept.with_moves(cut(motion, 0.0, 2.0))
+    assert part.rows.move is None
+    _, (stretch,) = retime(part, kept.requirements)
+    assert stretch.factor == pytest.approx(56.25 / 30, rel=2e-4)
+
+
+LIFT = """\
+version: 1
+units: {angle: deg}
+robot: ur5e
+limits: {acceleration: 800, effort: robot}
+start: {joints: [0, -90, 90, 0, 90, 0]}
+moves:
+  - {planner: quintic, to: {joints: [20, -60, 60, 0, 90, 0]}, duration: 1}
+  - {attach: {mass: 8, com: [0, 0, 0.08]}}
+  - {planner: quintic, to: {joints: [-20, 0, 0, 0, 90, 0]}, duration: 1}
+output: {rate: 100, columns: [t, q, qd, qdd, tau, move]}
+"""
+
+
+def test_rows_without_moves_carry_what_the_moves_at_their_times_do(tmp_path: Path) -> None:
+    """The peer are the same rows with their moves; and as often as the load differs, it must be known."""
+    (tmp_path / "job.yaml").write_text(LIFT)
+    kept = kept_limits(str(tmp_path / "job.yaml"), None)
+    factors = []
+    for columns in (", move", ""):
+        free = LIFT.replace(", effort: robot", "").replace(", tau, move", columns)
+        rows = planned(tmp_path / "rows.csv", free)
+        motion = read_motion(str(rows), ReadingOptions(), joints=kept.robot.joint_names)
+        factors.append(retime(kept.with_moves(motion), kept.requirements)[1][0].factor)
+    assert factors[0] > 1.5
+    assert factors[0] == factors[1]
+    with pytest.raises(InputError, match="whose moves differ in limits, tool or load"):
+        retime(kept.with_moves(cut(motion, 1.2, 2.0)), kept.requirements)
 
 
 UR_GOAL = Path(__file__).parents[1] / "oracles/recorded/ur_goal.yaml"

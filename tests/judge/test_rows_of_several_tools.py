@@ -10,6 +10,7 @@ import pytest
 from tiers import few
 
 from trajcli.editing.edited_motion import ReadingOptions, read_motion
+from trajcli.editing.operations import cut
 from trajcli.editing.requirements import kept_limits
 from trajcli.editing.retiming import retime
 from trajcli.errors import InputError
@@ -126,8 +127,10 @@ def test_retiming_needs_to_know_the_tool_of_a_row(tmp_path: Path) -> None:
     limits = kept_limits(str(tmp_path / "job.yaml"), None)
     names, types = limits.robot.joint_names, limits.robot.joint_types
     motion = read_motion(str(tmp_path / "rows.csv"), ReadingOptions(), joints=names, joint_types=types)
-    with pytest.raises(InputError, match="has no column `move`, and the job changes its tool"):
-        retime(motion, limits.requirements)
+    assert np.unique(np.asarray(limits.with_moves(motion).rows.move)).tolist() == [0, 2, 4]
+    part = limits.with_moves(cut(motion, 0.0, 1.5))
+    with pytest.raises(InputError, match="has no column `move` and .* differ in limits, tool or load"):
+        retime(part, limits.requirements)
 
 
 def test_velocities_beside_joints_are_judged_with_the_tool_of_their_move(tmp_path: Path) -> None:

@@ -119,12 +119,14 @@ def retime(
 
     limits = kept_limits(*(None if name is None else str(name) for name in (job, robot)))
     arm = limits.robot
-    before = read_motion(
-        str(file),
-        ReadingOptions(),
-        joints=arm.joint_names,
-        joint_types=arm.joint_types,
-        declared=limits.units,
+    before = limits.with_moves(
+        read_motion(
+            str(file),
+            ReadingOptions(),
+            joints=arm.joint_names,
+            joint_types=arm.joint_types,
+            declared=limits.units,
+        )
     )
     reader = EditedMotion.as_written if output is None else partial(as_read, path=str(output))
     found, stretches = retimed(

@@ -126,12 +126,14 @@ def run_retime(options: RetimeCommand) -> int:
         refuse_job(ByteSource(options.file))
     limits = kept_limits(options.job, options.robot)
     robot = limits.robot
-    motion = read_motion(
-        options.file,
-        options.part(ReadingOptions),
-        joints=robot.joint_names,
-        joint_types=robot.joint_types,
-        declared=stated_units(arm[0] if arm else ""),
+    motion = limits.with_moves(
+        read_motion(
+            options.file,
+            options.part(ReadingOptions),
+            joints=robot.joint_names,
+            joint_types=robot.joint_types,
+            declared=stated_units(arm[0] if arm else ""),
+        )
     )
     reader = partial(as_read, path=options.output, form=options.form)
     kept = limits.requirements

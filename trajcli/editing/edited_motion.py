@@ -64,6 +64,11 @@ class EditedMotion:
         return {name: values for name, values in found.items() if values is not None}
 
     @property
+    def writes_moves(self) -> bool:
+        """Whether the file names the moves of its rows; a job may, where it does not."""
+        return any(column.quantity == "move" for column in self.columns)
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints: of the file, or j1, j2, ..."""
         return self.rows.joints or tuple(f"j{number}" for number in range(1, self.rows.q.shape[1] + 1))

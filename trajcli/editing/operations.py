@@ -30,7 +30,8 @@ def reverse(motion: EditedMotion) -> EditedMotion:
         for order, name in enumerate(ORDERS)
         if (values := motion.quantities.get(name)) is not None
     }
-    move = None if rows.move is None else rows.move[::-1].copy()
+    # a row is of the move of the interval that follows, the last one of that before
+    move = None if rows.move is None else np.append(rows.move[-2::-1], rows.move[0])
     notes = () if rows.tau is None else (_NO_EFFORT,)
     return motion.with_rows(t, quantities, move, *notes, decimals=decimals_for(motion, t))
 
@@ -94,38 +95,34 @@ def _snapped(motion: EditedMotion, time: float) -> float:
 
 
 def _at(motion: EditedMotion, times: Array) -> EditedMotion:
-    """Return the motion at some times: rows as they are where there is one, else as the curve is."""
+    """Return the motion at some times: rows as they are where there is one, else as the curve is.
+
+    Where a row is new, columns that the curve does not take are left out.
+    """
     rows = motion.rows
     nearest = _nearest(motion, times)
     between = rows.t[nearest] != times
     quantities = {name: values[nearest].copy() for name, values in motion.quantities.items()}
+    notes: tuple[str, ...] = ()
     if between.any():
-        for name, values in _between_rows(motion, times[between]).items():
-            quantities[name][between] = values
-        motion = motion.with_planned_decimals(tuple(motion.quantities))
+        of_curve = ORDERS[: 1 + (rows.qd is not None) * (1 + (rows.qdd is not None))]
+        others = ", ".join(name for name in quantities if name not in of_curve)
+        notes = (f"the columns {others} are left out: nothing says them between rows",) * bool(others)
+        quantities, curve = {name: quantities[name] for name in of_curve}, motion.curve()
+        for order, values in enumerate(quantities.values()):
+            values[between] = curve.evaluate(times[between], order)
+        motion = motion.with_planned_decimals(of_curve)
     before = np.clip(np.searchsorted(rows.t, times, side="right") - 1, 0, rows.t.size - 1)
     move = None if rows.move is None else rows.move[before]
-    return motion.with_rows(times, quantities, move, decimals=decimals_for(motion, times))
-
-
-def _between_rows(motion: EditedMotion, times: Array) -> dict[str, Array]:
-    """Return all quantities at times between rows: of the curve, what it takes from them, others linear."""
-    rows, curve = motion.rows, motion.curve()
-    of_curve = ORDERS[: 1 + (rows.qd is not None) * (1 + (rows.qdd is not None))]
-    found = {}
-    for name, values in motion.quantities.items():
-        if name in of_curve:
-            found[name] = curve.evaluate(times, ORDERS.index(name))
-        else:
-            found[name] = np.stack([np.interp(times, rows.t, column) for column in values.T], axis=1)
-    return found
+    return motion.with_rows(times, quantities, move, *notes, decimals=decimals_for(motion, times))
 
 
 def join(first: EditedMotion, second: EditedMotion) -> EditedMotion:
     """Return one motion after the other: the second begins when the first ends, and where it ends.
 
     Columns and units are those of the first. Where the accelerations of both differ, the row between them
-    has that of the second.
+    has that of the second. Moves are counted on, unless both motions end and begin in one move at one time,
+    as parts of one file do.
 
     Raises:
         InputError: When they have not the same joints, or the second lacks a column of the first.
@@ -140,11 +137,14 @@ def join(first: EditedMotion, second: EditedMotion) -> EditedMotion:
         name: np.concatenate([values[:-1], second.quantities[name]])
         for name, values in first.quantities.items()
     }
-    move = None
+    move, notes = None, _step(first, second)
     if a.move is not None and b.move is not None:
-        later = 0 if not shift else int(a.move.max()) + 1 - int(b.move.min())
+        parts = not shift and a.move[-1] == b.move[0]
+        later = 0 if parts else int(a.move.max()) + 1 - int(b.move.min())
         move = np.concatenate([a.move[:-1], b.move + later])
-    return first.with_rows(t, quantities, move, *_step(first, second), decimals=decimals_for(first, t))
+    elif a.move is not None:
+        notes = (*notes, f"the column move is left out: {b.source} has none")
+    return first.with_rows(t, quantities, move, *notes, decimals=decimals_for(first, t))
 
 
 def _check_alike(first: EditedMotion, second: EditedMotion) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +16,9 @@ from trajcli.frozen import frozen
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
 from trajcli.units import Units, amount_text
+
+if TYPE_CHECKING:
+    from trajcli.planning.plan import Plan
 
 _RULES = ("continuity", "time", "derivative")
 _SHARES = (0.0, 0.25, 0.5, 0.75)
@@ -29,12 +34,21 @@ class KeptLimits:
         requirements: For the judge of rows.
         units: Of files that name none, and of messages.
         say: Returns a number of a message in these units.
+        plan: Of the job; None without one.
     """
 
     robot: Robot
     requirements: Requirements
     units: Units
     say: Callable[[Amount], str]
+    plan: Plan | None = None
+
+    def with_moves(self, motion: EditedMotion) -> EditedMotion:
+        """Return a motion whose rows say their moves as `trajcli check` sees them, where anything says them."""
+        from trajcli.judge.file import moves_by_time
+
+        named = moves_by_time(self.plan, (motion.rows,)) if motion.rows.move is None else None
+        return motion if named is None else replace(motion, rows=named(motion.rows))
 
 
 def kept_limits(job: str | None, robot: str | None) -> KeptLimits:
@@ -63,12 +77,10 @@ def _of_job(path: str) -> KeptLimits:
     with np.errstate(all="ignore"):
         plan = plan_job(loaded)
     by_move = {move.index: move.robot for move in plan.moves}
-    return _kept(Requirements(loaded.robot, by_move), loaded.units)
+    return replace(_kept(Requirements(loaded.robot, by_move), loaded.units), plan=plan)
 
 
 def _kept(requirements: Requirements, units: Units) -> KeptLimits:
-    from dataclasses import replace
-
     robot = requirements.robot
     arms = [robot, *requirements.by_move.values()]
     if robot.convention is not None and any(arm.limits.tcp != ToolLimits() for arm in arms):

@@ -25,6 +25,7 @@ from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.limits.kinds import STRETCHABLE
 from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.recorded_motion import RecordedMotion
@@ -76,14 +77,12 @@ def retime(
         as_read: Returns a motion as a reader of what is written of it finds it.
 
     Raises:
-        InputError: When there are no moves, or nothing bounds how fast it may be, or nothing says which tool
-            of several a row is of.
+        InputError: When there are no moves, or nothing bounds how fast it may be, or nothing says which move
+            of several that differ a row is of.
         VerificationError: When something is wrong with it that no time mends.
     """
-    tools = {robot.tool.tobytes() for robot in requirements.by_move.values()}
-    if len(tools) > 1 and requirements.tool is not None and motion.rows.move is None:
-        what = f"{motion.rows.source} has no column `move`, and the job changes its tool, whose limits count"
-        raise InputError(what, hint="plan with `columns: [t, q, qd, qdd, move]`")
+    if motion.rows.move is None:
+        requirements = _of_any_row(requirements, motion)
     judge, strictly = (_judge_of(requirements, strict=strict) for strict in (False, True))
     ranges = _ranges(motion) if per_move else [(slice(0, motion.rows.t.size), None)]
     stretches = []
@@ -91,6 +90,23 @@ def retime(
         factor, binding = _smallest(_part(motion.rows, rows), judge, strictly, fastest=fastest)
         stretches.append(Stretch(factor, moves, binding))
     return _verified(motion, [rows for rows, _ in ranges], stretches, judge, as_read)
+
+
+def _of_any_row(requirements: Requirements, motion: EditedMotion) -> Requirements:
+    """Return requirements of rows that say no move: there are some where all moves have the same."""
+    arms = {_what_limits(arm, tool=requirements.tool is not None): arm for arm in requirements.by_move.values()}
+    if len(arms) > 1:
+        rows = f"{motion.rows.source} has no column `move` and does not last as long as the plan of the job"
+        hint = "plan CSV with `columns: [t, q, qd, qdd, move]`, or retime by --robot"
+        raise InputError(f"{rows}, whose moves differ in limits, tool or load", hint=hint)
+    return replace(requirements, robot=next(iter(arms.values()), requirements.robot))
+
+
+def _what_limits(robot: Robot, *, tool: bool) -> tuple[object, ...]:
+    """Return what the limits of an arm depend on, as a key; its tool and loads only where they count."""
+    limits = robot.limits
+    bounds = (getattr(limits, name).tobytes() for name in (*QUANTITIES, "velocity_by_position", "effort"))
+    return (*bounds, limits.tcp, *(robot.equipment if tool or limits.has_effort else ()))
 
 
 def _judge_of(requirements: Requirements, *, strict: bool) -> Judge:

@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from trajcli.columns import JOINT_ORDERS, Column
+from trajcli.columns import EFFORT, JOINT_GROUPS, JOINT_ORDERS, Column
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import ORDERS, EditedMotion, rounded
 from trajcli.errors import InputError
@@ -115,7 +115,7 @@ def _plain_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
     joints = range(motion.rows.q.shape[1])
     found = [column("t", "t", None)]
     found += [column(f"{name}{joint + 1}", name, joint) for name in motion.quantities for joint in joints]
-    return tuple(found) if motion.rows.move is None else (*found, column("move", "move", None))
+    return (*found, column("move", "move", None)) if motion.writes_moves else tuple(found)
 
 
 def _blocks(motion: EditedMotion, columns: tuple[WrittenColumn, ...]) -> Iterator[Array]:
@@ -135,16 +135,16 @@ def _cells(motion: EditedMotion, column: WrittenColumn, part: slice) -> Array:
 
 
 def _si_columns(motion: EditedMotion, form: StreamFormat) -> tuple[Column, ...]:
-    """Return the columns of a format in SI: those there are, or t, q, qd and qdd for a log."""
-    count = motion.rows.q.shape[1]
-    names = [name for name in ORDERS if name in motion.quantities]
-    if form.content == "log":
-        names = list(ORDERS[:3])
+    """Return the columns of a format in SI: those there are; a log has q, qd and qdd, and no qddd."""
+    count, log = motion.rows.q.shape[1], form.content == "log"
+    names = list(ORDERS[:3]) if log else [name for name in ORDERS if name in motion.quantities]
     found = [Column("t", quantity=Quantity("time"))]
     for name in names:
         angle = Quantity("angle", JOINT_ORDERS[name])
         found += [Column(name, joint, None, angle) for joint in range(count)]
-    if motion.rows.move is not None and form.content == "rows":
+    if EFFORT in motion.quantities:
+        found += [Column(EFFORT, joint, None, Quantity("torque")) for joint in range(count)]
+    if motion.writes_moves and form.content == "rows":
         found.append(Column("move", quantity=Quantity("ratio")))
     return tuple(found)
 
@@ -155,7 +155,7 @@ def _si_rows(motion: EditedMotion, columns: tuple[Column, ...]) -> Iterator[Arra
         part = slice(low, low + ROWS)
         cells = [rows.t[part, None]]
         for name in dict.fromkeys(column.kind for column in columns):
-            if name in ORDERS:
+            if name in JOINT_GROUPS:
                 cells.append(motion.quantities.get(name, states.get(name, rows.q))[part])
             elif name == "move" and rows.move is not None:
                 cells.append(rows.move[part, None].astype(np.float64))
@@ -177,14 +177,13 @@ def _states(motion: EditedMotion) -> dict[str, Array]:
 def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tuple[str, ...]]:
     """Return what a format needs beside rows, and what it makes up or leaves out."""
     if form.content == "rows":
-        lost = ("the columns of efforts are left out: the format has none",) * (motion.rows.tau is not None)
-        return WriteOptions(), (*lost, *_note_of_names(motion))
+        return WriteOptions(), _note_of_names(motion)
     missing = [name for name in ORDERS[1:3] if name not in motion.quantities]
     notes = [f"no column {name}: it is of the curve through the rows" for name in missing]
     notes += [
-        f"the columns {name} are left out: the format has none"
-        for name in ("qddd", "tau")
-        if name in motion.quantities
+        f"the columns {name} are left out: the format is written without them"
+        for name in ("qddd", EFFORT)
+        if name in motion.quantities and (name, form.content) != (EFFORT, "log")
     ]
     knots = _knots(motion)
     if form.content == "knots":

@@ -130,7 +130,7 @@ def check_file(
         requirements = replace(requirements, interpolate=consumer().profile.interpolation)
     compared = _compared(opened, given, options)
     requirements = replace(requirements, planned=compared is not None and compared.planned)
-    by_time = None if "move" in motion.quantities else _moves_by_time(given, motion)
+    by_time = None if "move" in motion.quantities else moves_by_time(given.plan, motion.blocks())
 
     def blocks() -> Iterable[RecordedMotion]:
         entire = requirements.interpolate in _ENTIRE
@@ -295,26 +295,32 @@ def _of_tool_columns(
     ), read
 
 
-def _moves_by_time(given: _Given, motion: MotionFile) -> Callable[[RecordedMotion], RecordedMotion] | None:
+def moves_by_time(
+    plan: Plan | None, blocks: Iterable[RecordedMotion]
+) -> Callable[[RecordedMotion], RecordedMotion] | None:
     """Return what names the moves of rows of a file that does not: by the times of the plan.
 
-    None where the file does not last as long as the plan.
+    None where there is no plan, or the file does not last as long.
+
+    Args:
+        plan: Of the job.
+        blocks: All rows of the file.
     """
-    if given.plan is None:
+    if plan is None:
         return None
-    trajectory = given.plan.trajectory
-    stamps = [(rows.t[0], rows.t[-1]) for rows in motion.blocks()]
+    stamps = [(rows.t[0], rows.t[-1], rows.resolution.time) for rows in blocks]
     if not stamps:
         return None
+    trajectory, rounding = plan.trajectory, stamps[0][2]
     first, last = float(stamps[0][0]), float(stamps[-1][1])
     alone = len(trajectory.spans) == 1
-    if not alone and not abs(last - first - trajectory.duration) <= _SAME_DURATION + motion.resolution.time:
+    if not alone and not abs(last - first - trajectory.duration) <= _SAME_DURATION + rounding:
         return None
     starts = np.array([span.start for span in trajectory.spans])
     indices = np.array([span.index for span in trajectory.spans], dtype=np.int64)
 
     def named(rows: RecordedMotion) -> RecordedMotion:
-        since = rows.t - first + motion.resolution.time + np.spacing(abs(last))
+        since = rows.t - first + rounding + np.spacing(abs(last))
         later = np.searchsorted(starts, np.where(np.isfinite(since), since, 0.0), "right") - 1
         return replace(rows, move=indices[np.clip(later, 0, len(indices) - 1)])
 
