@@ -129,7 +129,7 @@ def test_retiming_needs_to_know_the_tool_of_a_row(tmp_path: Path) -> None:
     motion = read_motion(str(tmp_path / "rows.csv"), ReadingOptions(), joints=names, joint_types=types)
     assert np.unique(np.asarray(limits.with_moves(motion).rows.move)).tolist() == [0, 2, 4]
     part = limits.with_moves(cut(motion, 0.0, 1.5))
-    with pytest.raises(InputError, match="has no column `move` and .* differ in limits, tool or load"):
+    with pytest.raises(InputError, match=r"has no column `move` and .* differ in limits, tool or load"):
         retime(part, limits.requirements)
 
 

@@ -202,6 +202,21 @@ def test_an_arm_in_the_horizontal_that_rests_carries_anything() -> None:
 
 
 @pytest.mark.parametrize(
+    ("second", "where"),
+    [("60", "at [60, 0, 0] mm of the tcp"), ("50", "at the centres of mass that the job says")],
+)
+def test_a_place_is_named_where_all_is_carried_there(second: str, where: str, tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
+    text = EMPTY.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
+    attached = [
+        f"{{attach: {{mass: 1, com: [{x}, 0, 0]}}}}, {{planner: hold, duration: 1}}" for x in ("60", second)
+    ]
+    moves = ", {detach: {}}, ".join(attached)
+    (tmp_path / "job.yaml").write_text(text[: text.index("moves:")] + f"moves: [{moves}]\n")
+    assert run_payload(PayloadCommand(job=str(tmp_path / "job.yaml"))) == 0
+    assert capsys.readouterr().out == f"any mass {where} will do in moves 1, 4\n"
+
+
+@pytest.mark.parametrize(
     ("text", "at", "message"),
     [
         (EMPTY, 3, "--at 3: arm has no such move"),

@@ -52,6 +52,17 @@ def arm(name: str) -> Robot:
     return random_arm(int(seed), kind) if seed else load_robot(name)
 
 
+def test_rotors_are_said_in_comments() -> None:
+    robot = random_arm(3, "standard")
+    joints = (replace(robot.joints[0], rotor=0.25), *robot.joints[1:])
+    written = urdf_of(replace(robot, joints=joints))
+    unit = "kg" if robot.joints[0].type == "prismatic" else "kg m^2"
+    assert written.count("rotor") == 1
+    assert f"<!-- rotor: 0.25 {unit}, which the format has no element for -->\n  </joint>" in written
+    assert tuple(ReadBack(written).moving) == robot.joint_names
+    assert "rotor" not in urdf_of(robot)
+
+
 @pytest.mark.parametrize("name", few(ARMS, 20))
 def test_forward_kinematics_is_that_of_the_table(name: str) -> None:
     robot = arm(name)

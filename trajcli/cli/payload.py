@@ -40,8 +40,10 @@ def run_payload(options: PayloadCommand) -> int:
 
 
 def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
-    com = [to_user(x, Quantity("length"), loaded.units) for x in capacity.payload.com.tolist()]
-    where = f"at [{', '.join(numbers([x]) for x in com)}] {loaded.units.length} of the tcp"
+    where = "at the centres of mass that the job says"
+    if capacity.com is not None:
+        com = [to_user(x, Quantity("length"), loaded.units) for x in capacity.com.tolist()]
+        where = f"at [{', '.join(numbers([x]) for x in com)}] {loaded.units.length} of the tcp"
     carried = [k for k in capacity.moves if not loaded.job.moves[k].handles]
     moves = f"move{'s' * (len(carried) > 1)} {', '.join(map(str, carried))}"
     if capacity.mass is None:

@@ -44,7 +44,7 @@ class KeptLimits:
     plan: Plan | None = None
 
     def with_moves(self, motion: EditedMotion) -> EditedMotion:
-        """Return a motion whose rows say their moves as `trajcli check` sees them, where anything says them."""
+        """Return a motion whose rows say their moves where the file, or the times of the plan, say them."""
         from trajcli.judge.file import moves_by_time
 
         named = moves_by_time(self.plan, (motion.rows,)) if motion.rows.move is None else None

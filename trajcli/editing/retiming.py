@@ -94,7 +94,9 @@ def retime(
 
 def _of_any_row(requirements: Requirements, motion: EditedMotion) -> Requirements:
     """Return requirements of rows that say no move: there are some where all moves have the same."""
-    arms = {_what_limits(arm, tool=requirements.tool is not None): arm for arm in requirements.by_move.values()}
+    arms = {
+        _what_limits(arm, tool=requirements.tool is not None): arm for arm in requirements.by_move.values()
+    }
     if len(arms) > 1:
         rows = f"{motion.rows.source} has no column `move` and does not last as long as the plan of the job"
         hint = "plan CSV with `columns: [t, q, qd, qdd, move]`, or retime by --robot"

@@ -42,7 +42,7 @@ class PayloadCapacity:
 
     Attributes:
         mass: kg; None where any mass will do.
-        payload: Where it is carried, with that mass or that of the job.
+        com: Where it is carried, in the frame of the tcp, m, (3,); None where the job carries it at several.
         moves: Indices of the moves in which it is carried.
         joint: Name of the joint that binds; None where none does.
         move: Index of the move in which it binds.
@@ -53,7 +53,7 @@ class PayloadCapacity:
     """
 
     mass: float | None
-    payload: Payload
+    com: Array | None
     moves: tuple[int, ...]
     joint: str | None = None
     move: int | None = None
@@ -83,7 +83,7 @@ def payload_capacity(
     search = _Search(loaded, _carriers(loaded, at), planned or alone)
     low, high = search.bracket_of_stops() or search.bracket()
     if high is None:
-        return PayloadCapacity(None, search.template, search.moves)
+        return PayloadCapacity(None, search.com, search.moves)
     return search.result(low, high)
 
 
@@ -113,6 +113,8 @@ class _Search:
         self._loaded, self._carriers, self._planned = loaded, carriers, planned
         self.moves = tuple(sorted(carriers))
         self.template = carriers[self.moves[0]]
+        alike = len({tuple(payload.com.tolist()) for payload in carriers.values()}) == 1
+        self.com = self.template.com if alike else None
         self._plans: dict[float, Plan | TrajcliError] = {}
 
     def attempt(self, mass: float) -> Plan | TrajcliError:
@@ -257,7 +259,7 @@ class _Search:
 
     def result(self, low: float, high: float) -> PayloadCapacity:
         """Return the capacity within a bracket, and what binds: what fails at its upper end."""
-        capacity = PayloadCapacity(low, self.template, self.moves)
+        capacity = PayloadCapacity(low, self.com, self.moves)
         failed = self.attempt(high)
         if isinstance(failed, Plan):
             worst = max(failed.verdict.findings, key=lambda found: (found.kind == "effort", found.excess))

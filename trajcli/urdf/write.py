@@ -1,8 +1,8 @@
 """Text of a robot in URDF: joints with limits, and simple shapes of the links.
 
 URDF has no negative DH direction, but axes: a joint of sign -1 has the axis 0 0 -1. Lengths are in m, angles
-in rad. What URDF cannot say is in a comment: limits of acceleration and jerk, bounds of one side. Limits of
-velocity by position stand in Franka's element for them.
+in rad. What URDF cannot say is in a comment: limits of acceleration and jerk, bounds of one side, rotors.
+Limits of velocity by position stand in Franka's element for them.
 
 Source: the URDF XML specification of urdfdom, version 1.0 (https://wiki.ros.org/urdf/XML).
 """
@@ -106,9 +106,12 @@ def _moving(joint: UrdfJoint, parent: str, robot: Robot, number: int) -> Iterato
     if np.isfinite(deceleration):
         near = f'deceleration_limit="{deceleration!r}" velocity_offset="{offset!r}"'
         yield f"    <position_based_velocity_limits {near}/>"
-    friction = robot.joints[number].friction
+    friction, rotor = robot.joints[number].friction, robot.joints[number].rotor
     if friction.coulomb or friction.viscous:
         yield f'    <dynamics damping="{friction.viscous!r}" friction="{friction.coulomb!r}"/>'
+    if rotor:
+        unit = "kg" if joint.prismatic else "kg m^2"
+        yield f"    <!-- rotor: {rotor!r} {unit}, which the format has no element for -->"
     yield "  </joint>"
 
 
