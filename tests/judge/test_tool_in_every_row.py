@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -125,21 +126,22 @@ def test_a_tool_that_only_the_curve_makes_too_fast_is_a_warning(key: str, at: in
     lever = LEVER if key == "speed" else 1.0
     for period, peaked, limit, severity in (
         (PERIOD, 0.8, 1.05, "warning"),
+        (PERIOD, -0.6, 1.06, "warning"),  # 1.7 times the limit
         (PERIOD, 0.8, 0.99, "error"),  # the mean of two rows is over it
+        (PERIOD, 0.8, 1 - 5e-5, "error"),  # likewise
         (0.02, 0.8, 1.05, "error"),  # they stand too far apart
-        (PERIOD, -1.5, 2.2, "error"),  # more than twice the limit
+        (PERIOD, -1.5, 1.1, "error"),  # more than twice the limit
     ):
         t = period * np.arange(10)
         q, qd = np.zeros((10, 2)), np.zeros((10, 2))
         q[:, 0], qd[:, 0] = side * t, side
         qd[at : at + 2, 0] = side * peaked
         peak = peaked + 1.5 * (1 - peaked)
-        if peaked < 0:
-            limit = 0.49 * peak
         motion = rows(t, q, qd)
         (found,) = of_tool(motion, link(**{key: lever * limit}))
         assert (found.severity, found.certainty) == (severity, "exceeded"), (period, limit)
-        assert found.value == pytest.approx(lever * peak, rel=1e-5)
+        assert (found.value, found.row) == (pytest.approx(lever * peak, rel=1e-5), at + 1)
+        assert found.time == pytest.approx(t[at] + 0.5 * period, abs=1e-2 * period)
         (asked,) = of_tool(motion, link(**{key: lever * limit}), "cubic")
         assert asked.severity == "error"
 
@@ -466,3 +468,16 @@ def test_rounding_of_a_slide_that_is_swung_counts_with_its_length(key: str, powe
     assert found.certainty == "within rounding"
     farther = replace(motion, q=q + np.array([0.0, 20 * off]))
     assert [each.certainty for each in of_tool(farther, beam, "quintic")] == ["exceeded"]
+
+
+def test_rows_at_which_the_tool_is_too_fast_are_counted_wherever_it_goes() -> None:
+    """Half a turn at an even speed, of which each direction in space has its share."""
+    t = np.linspace(0.0, np.pi, 41)
+    (found,) = of_tool(rows(t, np.stack([t, 0.0 * t], axis=1)), link(speed=0.9 * LEVER))
+    assert found.count == 40
+
+
+def test_of_a_path_whose_segments_overlap_it_is_said_that_it_is_not_judged() -> None:
+    paths = {move: SimpleNamespace(path=path, overlaps=not path) for move, path in ((3, None), (5, False))}
+    notes = ToolJudge(link(), {0: None, **paths}).notes
+    assert notes == [f"move {k}: its segments overlap, the distance from them is not judged" for k in (3, 5)]
