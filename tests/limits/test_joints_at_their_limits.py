@@ -265,7 +265,13 @@ def test_a_state_outside_a_range_that_does_not_hold_zero_is_told_the_end_that_it
 
 
 @pytest.mark.parametrize(
-    ("begins", "ends", "kinds"), [(0.0, 1.0, {"velocity", "acceleration"}), (1.0, 1.0, {"velocity"})]
+    ("begins", "ends", "kinds"),
+    [
+        (0.0, 1.0, {"velocity", "acceleration"}),
+        (1.0 - 1e-5, 1.0, {"velocity", "acceleration"}),
+        (1.0, 1.0, {"velocity"}),
+        (0.0, 0.4, {"acceleration"}),  # it is as fast as 0.8 rad/s then
+    ],
 )
 def test_a_move_of_no_duration_has_no_acceleration_and_no_factor(
     begins: float, ends: float, kinds: set[str]
@@ -281,7 +287,7 @@ def test_a_move_of_no_duration_has_no_acceleration_and_no_factor(
     assert {each.kind for each in found} == kinds
     assert all((each.factor is None) is (begins == ends) for each in found)
     near = velocity_by_position.FAMILY.survey(LimitedMove(whole, span, of_position()))
-    assert len(near.uses) == (begins < ends)
+    assert len(near.uses) == (ends - begins == 1.0)  # of a whole piece
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -294,3 +300,83 @@ def test_a_motion_is_stretched_for_any_derivative_in_either_direction(order: int
     assert JointSurvey(tuple(peaks), Limits(one, one, one, one)).excess() > 0.1
     wide = [2.0 * one if k == order else one for k in range(4)]
     assert JointSurvey(tuple(peaks), Limits(*wide)).excess() < 0
+
+
+@pytest.mark.parametrize("moves", [True, False])
+@pytest.mark.parametrize("seed", range(6))
+def test_each_joint_is_over_each_of_its_limits_by_itself(seed: int, *, moves: bool) -> None:
+    """Against a plain search: the worse end by distance of positions, and by ratio of their derivatives."""
+    rng = np.random.default_rng(seed)
+    bounds = [np.stack([-rng.uniform(0.5, 2, 3), rng.uniform(0.5, 2, 3)], axis=1) for _ in range(4)]
+    peaks = tuple(
+        Peaks(-rng.uniform(0.2, 3, 3), rng.uniform(5, 6, 3), rng.uniform(0.2, 3, 3), rng.uniform(5, 6, 3))
+        for _ in range(4)
+    )
+    arm, names = several(3, Limits(*bounds)), ("position", "velocity", "acceleration", "jerk")
+    expected = {}
+    for order, joint in np.ndindex(4 if moves else 2, 3):
+        (low, high), peak = bounds[order][joint], peaks[order]
+        ends = [(peak.low[joint], low, peak.low_time[joint]), (peak.high[joint], high, peak.high_time[joint])]
+        if not any(abs(value) > abs(limit) for value, limit, _ in ends):
+            continue
+        value, limit, time = max(
+            ends, key=lambda end: end[0] / end[1] if order else abs(end[0]) - abs(end[1])
+        )
+        factor = (value / limit) ** (1 / order) if order and moves else None
+        expected[names[order], f"j{joint}"] = (value, limit, time - 4.5, factor, order, joint)
+    found = list(JointSurvey(peaks, Limits(*bounds), moves).over(arm, 4.5))
+    assert {(each.kind, each.joint) for each in found} == expected.keys()
+    assert len(found) == len(expected) > 1
+    for each in found:
+        value, limit, time, factor, order, joint = expected[each.kind, each.joint]
+        assert (each.value, each.limit, each.time) == (value, limit, pytest.approx(time))
+        assert each.factor == (None if factor is None else pytest.approx(factor))
+        for name, amount in (("value", value), ("limit", limit)):
+            told = each.amounts[name]
+            assert (told.value, told.order, told.joint) == (amount, order, joint)
+        assert each.text().startswith(f"the {each.kind} of j{joint} reaches ")
+        assert f" at t = {time:.9g} s, its limit is " in each.text()
+
+
+def test_of_a_state_the_first_joint_that_is_over_its_limit_is_told_in_words() -> None:
+    one = np.tile([-1.0, 1.0], (3, 1))
+    values = np.array([0.0, -1.5, 2.5])
+    for order, name in enumerate(("position", "velocity", "acceleration")):
+        state = [np.zeros(3) for _ in range(3)]
+        state[order] = values
+        text, amounts = joints.FAMILY.why_not_in_state(
+            several(3, Limits(one, one, one, one)), State(*state)
+        ) or (
+            "",
+            {},
+        )
+        assert text == f"{{joint}} {{verb}} with {name} {{value}}, its limit is {{limit}}"
+        assert (amounts["joint"], amounts["value"].value) == ("j1", -1.5)
+
+
+def test_limits_must_be_as_many_as_moves() -> None:
+    free = of_velocity(-1.0, 1.0)
+    curve = PiecewisePolynomial(np.arange(3.0), np.zeros((1, 2, 1)))
+    peaks = peaks_between(curve, np.array([[0.0, 1.0], [1.0, 2.0]]))
+    for count in (1, 3):
+        with pytest.raises(ValueError, match=f"{count} limits for 2 moves"):
+            joints.moves_over(peaks, [free] * count)
+
+
+@pytest.mark.parametrize("joint", range(3))
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_move_is_over_by_any_joint_and_any_derivative(order: int, joint: int) -> None:
+    """Two moves of equal limits that are values of their own; the second one moves a joint with t^3."""
+    bounds = [np.tile([-100.0, 100.0], (3, 1)) for _ in range(4)]
+    wide = Limits(*bounds)
+    tight = [each.copy() for each in bounds]
+    tight[order][joint] = [-1e-3, 2.0]
+    rows = np.zeros((4, 2, 3))
+    rows[0, 1, joint] = 1.0  # 3 t^2, 6 t and 6: over 2 for t in (0.9, 1)
+    peaks = peaks_between(PiecewisePolynomial(np.arange(3.0), rows), np.array([[0.0, 1.0], [1.0, 2.0]]))
+    assert joints.moves_over(peaks, [wide, dataclasses.replace(wide)]) == []
+    assert joints.moves_over(peaks, [Limits(*tight), Limits(*tight)]) == [1]
+    assert joints.moves_over(peaks, [Limits(*tight), wide]) == []
+    shared = dataclasses.replace(Limits(*tight), acceleration=wide.acceleration, jerk=wide.jerk)
+    other = dataclasses.replace(shared, velocity=shared.velocity, acceleration=tight[2], jerk=tight[3])
+    assert joints.moves_over(peaks, [shared, other]) == [1]
