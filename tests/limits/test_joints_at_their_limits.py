@@ -380,3 +380,23 @@ def test_a_move_is_over_by_any_joint_and_any_derivative(order: int, joint: int) 
     shared = dataclasses.replace(Limits(*tight), acceleration=wide.acceleration, jerk=wide.jerk)
     other = dataclasses.replace(shared, velocity=shared.velocity, acceleration=tight[2], jerk=tight[3])
     assert joints.moves_over(peaks, [shared, other]) == [1]
+
+
+@pytest.mark.parametrize("first", [0.5, 2.0])
+@pytest.mark.parametrize("begins", [0.0, 7.0])
+def test_a_move_is_surveyed_from_its_own_start_to_its_own_end(begins: float, first: float) -> None:
+    """Of two moves at 0.5 and at 2 rad/s one is over 1 rad/s, in whichever order, on curves of whatever clock."""
+    speeds = np.array([first, 1.0 / first])
+    rows = np.stack([speeds, [0.0, first]])[:, :, None]
+    curve = PiecewisePolynomial(begins + np.arange(3.0), rows)
+    spans = tuple(Span(k, "quintic", float(k), k + 1.0, 2) for k in range(2))
+    start, end = (
+        State(np.array([q]), np.array([v]), np.zeros(1)) for q, v in zip((0.0, 2.5), speeds, strict=True)
+    )
+    whole = Trajectory(curve, ("j1",), ("revolute",), spans, start, end)
+    bounds = of_velocity(-1.0, 1.0)
+    for k, span in enumerate(spans):
+        found = list(joints.FAMILY.survey(LimitedMove(whole, span, bounds)).over(whole, begins))
+        assert [(each.value, each.limit) for each in found] == [(2.0, 1.0)] * int(speeds[k] > 1)
+        assert all(k <= each.time <= k + 1 for each in found)
+    assert joints.moves_over(joints.peaks_by_move(whole), [bounds] * 2) == [int(first < 1)]
