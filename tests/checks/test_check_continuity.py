@@ -452,3 +452,33 @@ def test_breaks_are_as_exact_as_the_time_at_which_they_stand(units: float, found
     for each in told:
         assert each.time == pytest.approx(1.0)
         assert "at t = 1 s" in each.text()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("more", "time"), [(1e-14, 1.0), (1e-9, 2.0)])
+def test_a_jump_that_is_larger_by_more_than_rounding_is_the_larger_one(
+    more: float, time: float, sign: float
+) -> None:
+    """Half a radian forth and a little more back."""
+    levels = sign * np.array([0.0, 0.5, -0.5 * more])
+    found = judge(PiecewisePolynomial(np.arange(4.0), levels[None, :, None]))
+    assert [(each.kind, each.time) for each in found] == [("position_jump", time)]
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_at_a_border_one_joint_steps_to_rest_and_another_one_from_rest(first: int) -> None:
+    """Cubics of one joint up to the border, and of the other behind it: each step is of the move that has it."""
+    moving = cubics(0.0, 1.0)[0].coefficients[:, 0, 0]
+    rows = np.zeros((4, 2, 2))
+    rows[:, 0, first], rows[:, 1, 1 - first], rows[3, 1, first] = moving, moving, 1.0
+    parts = [PiecewisePolynomial(np.array([0.0, 1.0]), rows[:, [k]]) for k in range(2)]
+    whole = trajectory(*parts)
+    found = check_continuity(whole, [limits(2, jerk=1e9)] * 2)
+    names = [f"j{first + 1}", f"j{2 - first}"]
+    assert [(each.move, each.joint, each.time) for each in found] == [(0, names[0], 0.0), (1, names[1], 1.0)]
+    steps = [(step.time, step.joint, step.move) for step in steps_of(whole)]
+    assert sorted(steps) == [
+        (0.0, names[0], 0),
+        *sorted([(1.0, names[0], 0), (1.0, names[1], 1)]),
+        (2.0, names[1], 1),
+    ]
