@@ -375,6 +375,12 @@ def test_a_jump_at_any_break_is_found_and_has_its_time(order: int, at: int, bloc
     (found,) = check_continuity(whole, [limits(2, jerk=1e9)])
     assert (found.kind, found.joint, found.move) == (f"{QUANTITIES[order]}_jump", "j2", 0)
     assert [found.time, found.value] == pytest.approx([0.5 * at, 1.0])
+    for name in ("value", "limit"):
+        assert (found.amounts[name].order, found.amounts[name].joint, found.amounts["joint"]) == (
+            order,
+            1,
+            "j2",
+        )
     steps = [(step.time, step.joint, step.size) for step in acceleration_steps(whole, [limits(2)])]
     assert steps == ([(pytest.approx(0.5 * at), "j2", pytest.approx(1.0))] if order == 2 else [])
 
