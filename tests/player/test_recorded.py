@@ -100,6 +100,30 @@ def test_its_clean_twin_is_satisfied(tmp_path: Path) -> None:
     assert shown["findings"] == []
 
 
+@pytest.mark.parametrize("first", [False, True])
+def test_a_job_that_changes_tools_changes_them_in_its_rows(first: bool, tmp_path: Path) -> None:
+    t = np.arange(41) / 10
+    s = np.minimum(t, 4 - t) / 2
+    q = s**2 * (3 - 2 * s)  # the cubic, there and back
+    rows = np.stack([100 + t, q, 0 * q], axis=1)
+    np.savetxt(tmp_path / "rows.csv", rows, "%.9f", delimiter=",", header="t,q1,q2", comments="")
+    job = tmp_path / "job.yaml"
+    change, there = "  - {tool: long}\n", "  - {planner: cubic, to: {joints: [1, 0]}, duration: 2}\n"
+    back = there.replace("[1, 0]", "[0, 0]")
+    moves = change + there + back if first else there + change + back
+    job.write_text(
+        "version: 1\nrobot: planar2r\ntools: {long: {xyz: [0.5, 0, 0]}}\nstart: {joints: [0, 0]}\n"
+        "limits: {velocity: 9, acceleration: 99}\nmoves:\n" + moves
+    )
+    source = ByteSource(str(tmp_path / "rows.csv"))
+    shown = scene_of_file(source, str(job), judged_file(source, CheckOptions(job=str(job))))
+    # stretched, 0.3 + 0.2 m, the long tool ends at 1 m: it is at x = 1 m at the end, with q1 = 0
+    assert shown["tool"]["positions"]["high"][0] == pytest.approx(1.0)
+    changes = shown["robot"].get("changes", [])
+    assert [(one["time"], one["tool"][0][3]) for one in changes] == ([] if first else [(102.0, 0.5)])
+    assert shown["robot"]["tool"][0][3] == (0.5 if first else 0.0)
+
+
 def test_what_cannot_be_judged_says_why(tmp_path: Path) -> None:
     (tmp_path / "rows.csv").write_text("t,q1,q2\n0,0,0\n1,1,1\n")
     shown = scene_of_file(str(tmp_path / "rows.csv"), "planar2r", "it has no limits")

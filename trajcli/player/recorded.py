@@ -31,6 +31,7 @@ from trajcli.queries.forward import refuse_far
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import read_table
 from trajcli.streams.table import Table
+from trajcli.trajectory import Trajectory
 from trajcli.units import AngleUnit, LengthUnit, Units, amount_text, joint_quantity
 from trajcli.version import __version__
 
@@ -77,7 +78,7 @@ def scene_of_file(
         **_judgement(checked, units, float(times[0])),
         "made_by": f"Made by trajcli {__version__}",
         "joints": _joints(columns, robot, units),
-        **geometry_of(robot, rows, units, _NO_ROBOT),
+        **geometry_of(robot, rows, units, _NO_ROBOT, trajectory=_of_job(checked)),
         "rows": rows.packed(),
         "moves": [_move(label, times[low], times[high]) for label, low, high in moves],
         "limits": limits_of(limits),
@@ -86,6 +87,12 @@ def scene_of_file(
         "notes": [*_judgement_notes(checked), *_notes(rows, kept, times)],
     }
     return dressed(scene, *meshes_of_robot(robot_name, meshes))
+
+
+def _of_job(checked: CheckedFile | str | None) -> Trajectory | None:
+    """Return the trajectory of the job by which a file was judged; None where there is none."""
+    plan = checked.plan if isinstance(checked, CheckedFile) else None
+    return None if plan is None else plan.trajectory
 
 
 def _judgement(checked: CheckedFile | str | None, units: Units, start: float) -> dict[str, Any]:

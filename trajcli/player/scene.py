@@ -137,7 +137,7 @@ def geometry_of(
         rows: Its motion.
         units: To be shown.
         reason: Why there is no arm.
-        trajectory: Whose spans know which tool is on the flange; None where that is one.
+        trajectory: Whose spans, from the first row on, know the tool on the flange; None where that is one.
     """
     if robot is None or robot.convention is None:
         if robot is not None:
@@ -159,9 +159,11 @@ def geometry_of(
     ]
     arm: dict[str, Any] = {"rows": table, "base": robot.base.tolist(), "tool": robot.tool.tolist()}
     if trajectory is not None:
+        moving = [span for span in trajectory.spans if span.duration > 0] or list(trajectory.spans[:1])
+        arm["tool"] = (moving[0].arm(robot) if moving else robot).tool.tolist()
         changes = [
-            {"time": span.start, "tool": span.arm(robot).tool.tolist()}
-            for before, span in pairwise(span for span in trajectory.spans if span.duration > 0)
+            {"time": float(rows.times[0]) + span.start, "tool": span.arm(robot).tool.tolist()}
+            for before, span in pairwise(moving)
             if span.tool is not before.tool
         ]
         arm |= {"changes": changes} if changes else {}
@@ -176,7 +178,7 @@ def geometry_of(
 def _tool(robot: Robot, rows: DrawnRows, units: Units, trajectory: Trajectory | None) -> dict[str, Any]:
     from trajcli.kinematics.forward import forward
 
-    q, times = rows.values["q"], rows.times.copy()
+    q, times = rows.values["q"], rows.times - rows.times[0]
     times[:-1][np.diff(times) == 0] -= 2 * AT_BREAK  # of two rows at one time the first belongs to what ends
 
     def of_tools(values: Callable[[Robot, NDArray[np.intp]], Array]) -> Array:
