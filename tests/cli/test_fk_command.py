@@ -288,3 +288,17 @@ def test_rows_made_with_a_tool_say_that_it_is_missing(arms):
     assert "--tool, --base or --robot JOB" in bare.err
     for more in (("--tool", tool), ("--frame", "base")):
         assert arms.call("fk", "-r", "ur5e", *more, "-", stdin=rows).err == ""
+
+
+def test_rows_of_a_job_say_their_tool_in_the_frame_of_the_job(arms, tmp_path):
+    job = tmp_path / "job.yaml"
+    job.write_text(
+        "version: 1\nrobot: planar2r\nframes: {table: {xyz: [0.1, 0, 0], rpy: [0, 0, 1.5707963267948966]}}\n"
+        "start: {joints: [0, 0]}\nmoves: [{planner: hold, duration: 1}]\noutput: {in: table}\n"
+    )
+    # stretched to (0.5, 0) m in world, which is (0, -0.4) m from the table
+    head = "q1,q2,x,y,z,qw,qx,qy,qz\n"
+    assert arms.call("fk", "-r", job, "-", stdin=head + "0,0,0,-0.4,0,1,0,0,0\n").err == ""
+    other = arms.call("fk", "-r", job, "-", stdin=head + "0,0,0,-0.6,0,1,0,0,0\n").err
+    assert "up to 0.2 m from that of Planar 2R" in other
+    assert "JOB" not in other

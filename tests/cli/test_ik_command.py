@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +193,24 @@ def test_wrong_calls(arms, words, message):
     outcome = arms.call("ik", "--robot", "ur5e", *words)
     assert (outcome.code, outcome.out) == (2, "")
     assert message in outcome.err
+
+
+def test_rows_of_a_job_in_a_frame_of_its_own_need_a_base(arms, tmp_path: Path) -> None:
+    job = tmp_path / "job.yaml"
+    job.write_text(
+        "version: 1\nrobot: planar2r\nframes: {table: {xyz: [0.1, 0, 0], rpy: [0, 0, 1.5707963267948966]}}\n"
+        "start: {joints: [0, 0]}\nmoves: [{planner: hold, duration: 1}]\noutput: {in: table}\n"
+    )
+    # joints 0 and pi/2: 0.3 m along x of world, 0.2 m along y
+    rows = {"table": "x,y,z\n0.2,-0.2,0\n", "world": "x,y,z\n0.3,0.2,0\n"}
+    near = ("--near", "0,1.5")
+    refused = arms.call("ik", "-r", job, *near, "-", stdin=rows["table"])
+    assert refused.code == 2
+    assert "writes poses in 'table', and ik reads them in world" in refused.err
+    for name, text in rows.items():
+        (base,) = re.findall(rf"--base '([^']*)' in {name}", refused.err)
+        out = arms.call("ik", "-r", job, *near, "--base", base, "-", stdin=text).out
+        assert [float(cell) for cell in out.splitlines()[1].split(",")] == pytest.approx([0, np.pi / 2])
 
 
 def test_text(arms, tmp_path: Path):

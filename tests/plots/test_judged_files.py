@@ -110,6 +110,24 @@ def test_a_speed_of_the_tool_is_marked_in_its_panel(tmp_path: Path) -> None:
     assert not np.isfinite(shown["angular speed of the tool"].findings[:, 1]).any()
 
 
+def test_a_tool_that_a_file_says_in_the_frame_of_the_job_is_drawn_in_world(tmp_path: Path) -> None:
+    job = JOB.replace(
+        "output: {", "frames: {table: {xyz: [0.1, 0, 0], rpy: [0, 0, 90]}}\noutput: {in: table, "
+    )
+    t = 10 + np.arange(101) / 50
+    q = np.radians(quintic(t, 10, 12)[0])
+    x, y = 0.5 * np.cos(q) + 0.3 * np.cos(2 * q), 0.5 * np.sin(q) + 0.3 * np.sin(2 * q)
+    rows = np.stack([t, y, 0.1 - x, 0 * t], axis=1)
+    np.savetxt(tmp_path / "tool.csv", rows, "%.9f", delimiter=",", header="t,x,y,z", comments="")
+    plan = plan_job(job_from_text(job))
+    both = plan, [read_table(tmp_path / "tool.csv")], ["path"]
+    for picture, source in ((picture_of(*both), 1), (picture_of(*both, second=plan), 2)):
+        assert picture.views is not None
+        of_source = dict(picture.views.traces)
+        np.testing.assert_allclose(of_source[source], np.stack([x, y, 0 * t], axis=1), atol=1e-8)
+        np.testing.assert_allclose(of_source[source - 1][-1], [x[-1], y[-1], 0], atol=1e-8)
+
+
 def test_a_jump_is_marked_on_the_line_of_the_file(tmp_path: Path) -> None:
     plan, file = plan_job(job_from_text(JOB)), written(tmp_path, "clean")
     lines = file.read_text().splitlines()

@@ -8,7 +8,7 @@ from trajcli.cli.numbers import pose_lines
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.errors import InputError
 from trajcli.kinematics.forward import forward, link_poses
-from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
+from trajcli.queries.arm import ArmInUnits, LimitWatch, frame_of_rows, job_of_arm, open_arm
 from trajcli.queries.pose import pose_view
 from trajcli.streams.csv import write_csv
 from trajcli.streams.whole_file import standard_output
@@ -70,14 +70,20 @@ def _stream(arm: ArmInUnits, options: FkCommand) -> int:
     for name, given in (("--json", options.as_json), ("--links", options.links)):
         if given:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
-    watch = LimitWatch(arm.robot)
+    watch, job = LimitWatch(arm.robot), job_of_arm(options.robot)
+    watch.frame = None if job is None else frame_of_rows(job)
     columns, blocks = poses_of(arm, open_rows("-"), watch)
     with standard_output() as out:
         write_csv(blocks, columns, out, options.digits)
     _remark(arm, watch, rows=True)
     if watch.tool_off > _SAME_TOOL and options.frame == "world":
         off = f"the rows say where their tcp is, up to {watch.tool_off:.6g} m from that of {arm.robot.name}"
-        print_remark(f"{off}: they were made with another tool or base; say --tool, --base or --robot JOB")
+        if job is None:
+            print_remark(
+                f"{off}: they were made with another tool or base; say --tool, --base or --robot JOB"
+            )
+        else:
+            print_remark(f"{off}, which fk takes with one tool and base; say --tool or --base for others")
     return 0
 
 

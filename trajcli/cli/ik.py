@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from numpy.linalg import inv
+
 from trajcli.cli.numbers import number, numbers
 from trajcli.cli.outcome import print_json, print_lines, print_remark
 from trajcli.curves.piecewise import Array
@@ -12,8 +14,9 @@ from trajcli.errors import InputError, PlanningError
 from trajcli.job.inline import inline_target
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.language.targets import ik_target
-from trajcli.queries.arm import ArmInUnits, LimitWatch, open_arm
+from trajcli.queries.arm import ArmInUnits, LimitWatch, frame_of_rows, job_of_arm, open_arm
 from trajcli.queries.inverse import Wanted, answer_reports, find_answers, require_answer
+from trajcli.queries.pose import pose_view
 
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import IkCommand
@@ -96,12 +99,33 @@ def _lines(arm: ArmInUnits, solutions: Solutions, reports: Sequence[dict[str, An
     yield f"they miss the pose by at most {number(worst) if worst > 1e-12 else '1e-12'} (m, rad)"
 
 
+def _check_frame(arm: ArmInUnits, robot: str) -> None:
+    """Refuse rows by a job that writes poses in a frame of its own: nobody knows in which these are."""
+    job = job_of_arm(robot)
+    frame = None if job is None else frame_of_rows(job)
+    if job is None or frame is None:
+        return
+    inside, world = (_pose_text(arm, pose) for pose in (inv(frame) @ job.robot.stand, job.robot.stand))
+    name = job.job.output.frame
+    message = f"{job.name} writes poses in '{name}', and ik reads them in world: in which are these rows?"
+    hint = f"say where the base is there: --base '{inside}' in {name}, --base '{world}' in world"
+    raise InputError(message, hint=hint)
+
+
+def _pose_text(arm: ArmInUnits, pose: Array) -> str:
+    view = pose_view(pose, arm.units)
+    parts = (f"{key}: [{', '.join(map(number, view[key]))}]" for key in ("xyz", "quat_wxyz"))
+    return f"{{{', '.join(parts)}}}"
+
+
 def _stream(arm: ArmInUnits, near: Array | None, options: IkCommand) -> int:
     from trajcli.queries.inverse_stream import EveryAnswer, joints_of
     from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
     from trajcli.streams.whole_file import standard_output
 
+    if options.base is None:
+        _check_frame(arm, options.robot)
     if options.every:
         answers = EveryAnswer(arm, open_rows("-"), near, options.tolerance)
         with standard_output() as out:

@@ -27,6 +27,7 @@ from trajcli.plots.display_units import DisplayUnits, require_joints, units_of_f
 from trajcli.plots.panel import NO_POINTS, Panel, PanelBlock, PathViews, Picture, Trace
 from trajcli.plots.planned_motion import PlannedMotion, difference_block, rows_of_plan
 from trajcli.plots.sampling import thinned
+from trajcli.queries.arm import frame_of_rows
 from trajcli.streams.table import Table
 
 if TYPE_CHECKING:
@@ -69,7 +70,8 @@ def picture_of(
     if motion is not None and second is not None:
         tables = [rows_of_plan(second, motion.offset), *tables]
         judgements = [None, *judgements] if judgements else ()
-    records = _records(motion, tables, judgements) if tables else []
+    of_plans = int(second is not None)
+    records = _records(motion, tables, judgements, of_plans) if tables else []
     display = records[0].display if motion is None else motion.display
     chosen = choose_joints(joints, display.joint_names)
     drawn = choose_quantities(quantities, _sensible(motion, records), _impossible(motion, records))
@@ -97,9 +99,12 @@ def picture_of(
 
 
 def _records(
-    motion: PlannedMotion | None, tables: Sequence[Table], judgements: Sequence[Judgement | None]
+    motion: PlannedMotion | None,
+    tables: Sequence[Table],
+    judgements: Sequence[Judgement | None],
+    of_plans: int,
 ) -> list[DrawnTable]:
-    """Return the files in the units of the job, or in their own."""
+    """Return the files in the units of the job, or in their own; so many of the first are plans, in world."""
     from trajcli.plots.recorded_motion import DrawnTable, columns_of_table
 
     columns = [columns_of_table(table) for table in tables]
@@ -108,10 +113,10 @@ def _records(
             require_joints(table.file, of_table, motion.display)
         robot, display = motion.plan.loaded.robot, motion.display
         judged = judgements or [None] * len(tables)
-        known = display, robot
+        frames = [None] * of_plans + [frame_of_rows(motion.plan.loaded)] * (len(tables) - of_plans)
         return [
-            DrawnTable(t, c, *known, j, motion.plan.trajectory)
-            for t, c, j in zip(tables, columns, judged, strict=True)
+            DrawnTable(t, c, display, robot, j, motion.plan.trajectory, frame)
+            for t, c, j, frame in zip(tables, columns, judged, frames, strict=True)
         ]
     named = [(t.file, column) for t, c in zip(tables, columns, strict=True) for column in c]
     display = units_of_files(named)

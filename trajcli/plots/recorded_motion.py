@@ -52,6 +52,7 @@ class DrawnTable:
         robot: Whose tool it is where the file does not say where that is; None without a job.
         judgement: What is wrong with its motion; None where it was not judged.
         trajectory: Of the job, whose spans know which tool is on the flange.
+        frame: T_world_frame (4, 4) of the frame in which the file says where the tool is; None for world.
     """
 
     table: Table
@@ -60,6 +61,7 @@ class DrawnTable:
     robot: Robot | None = None
     judgement: Judgement | None = None
     trajectory: Trajectory | None = None
+    frame: Array | None = None
 
     def _of_tools(self, values: Callable[[Robot, NDArray[np.intp]], Array]) -> Array:
         """Return values of all rows, each of the arm with the tool that it has then."""
@@ -101,6 +103,8 @@ class DrawnTable:
         """Return the positions (N, 3) of the tool in world, in the unit of the picture."""
         if self._has(_POSITION):
             positions = self._of(*_POSITION).T
+            if self.frame is not None:
+                positions = positions @ self.frame[:3, :3].T + self.frame[:3, 3]
         else:
             motion = self._joints("q")
             if self.robot is None or motion is None:

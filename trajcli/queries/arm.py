@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from trajcli.units import (
     joint_quantity,
     unit_name,
 )
+
+if TYPE_CHECKING:
+    from trajcli.job.read import LoadedJob
 
 _TWO_TURNS = 4.0 * np.pi  # rad: no joint is sent there, and 13 degrees read as radians are
 
@@ -120,12 +123,24 @@ def open_sheet(name: str) -> RobotSheet:
     """
     if name in catalogue_names() or kind_of(name) != "file" or is_urdf(name):
         return load_sheet(name)
-    if not names_job(name):
+    loaded = job_of_arm(name)
+    if loaded is None:
         return load_sheet(Path(name))
+    return RobotSheet(loaded.robot, loaded.units, None, None, f"the robot of the job {loaded.name}", None)
+
+
+def job_of_arm(name: str) -> LoadedJob | None:
+    """Return the job that names an arm; None where it is named otherwise.
+
+    Raises:
+        InputError: With every flaw of the file.
+        FileError: When it cannot be read.
+    """
+    if not names_job(name):
+        return None
     from trajcli.job.read import load_job  # brings the planners
 
-    loaded = load_job(name)
-    return RobotSheet(loaded.robot, loaded.units, None, None, f"the robot of the job {loaded.name}", None)
+    return load_job(name)
 
 
 def names_job(name: str) -> bool:
@@ -153,6 +168,12 @@ def files_of_arm(name: str) -> Iterator[tuple[str, str]]:
         yield from files_of(read_document(name))
     elif name not in catalogue_names():
         yield "the robot's file", name
+
+
+def frame_of_rows(loaded: LoadedJob) -> Array | None:
+    """Return T_world_frame (4, 4) of the frame in which rows of a job say the pose; None for world."""
+    seen, robot = loaded.robot_of_rows, loaded.robot
+    return None if seen is robot else np.asarray(robot.base @ np.linalg.inv(seen.base))
 
 
 def stated_units(name: str) -> Units | None:
@@ -281,9 +302,11 @@ class LimitWatch:
         first: The first of these; None while there is none.
         remark: On the first joint beyond two turns, as `beyond_two_turns` says it; None while there is none.
         tool_off: How far the tcp is from where rows that say it have it, m, at most.
+        frame: T_world_frame (4, 4) of the frame in which they say it; None for world.
     """
 
     tool_off = 0.0
+    frame: Array | None = None
 
     def __init__(self, robot: Robot) -> None:
         self.rows, self.outside = 0, 0

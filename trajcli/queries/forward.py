@@ -106,6 +106,8 @@ def _poses(
         last = quaternions[-1]
         if known and watch is not None:
             stated = np.stack([block[:, i] * unit for i, unit in known], axis=1)
+            if watch.frame is not None:
+                stated = stated @ watch.frame[:3, :3].T + watch.frame[:3, 3]
             off = float(np.linalg.norm(stated - poses[:, :3, 3], axis=1).max())
             watch.tool_off = max(watch.tool_off, off)
         yield np.hstack([inputs.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
