@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -142,3 +143,34 @@ def test_what_is_no_archive_of_arrays_is_one_error(tmp_path: Path) -> None:
         file.write_bytes(text)
         with pytest.raises(InputError, match="archive"):
             list(open_motion(ByteSource(file, 50.0)).blocks())
+
+
+@pytest.mark.parametrize("shape", [(5,), (5, 1)])
+def test_pictures_beside_the_motion_are_left_out(shape: tuple[int, ...], tmp_path: Path) -> None:
+    """As data sets of robots have them: colours and depths first, times in a column or a list."""
+    t, q = np.arange(5) / 10, np.random.default_rng(2).normal(size=(5, 2))
+    pictures = {"images": np.zeros((5, 4, 4, 3), np.uint8), "depth": np.zeros((5, 4, 4))}
+    np.savez(tmp_path / "a.npz", **pictures, position=q, time=t.reshape(shape))
+    motion = open_motion(tmp_path / "a.npz", units="rad").whole()
+    np.testing.assert_array_equal(motion.q, q)
+    np.testing.assert_array_equal(motion.t, t)
+    np.savez(tmp_path / "b.npz", images=pictures["images"], more=pictures["images"])
+    with pytest.raises(InputError, match="holds no rows"):
+        open_motion(tmp_path / "b.npz", units="rad")
+
+
+def member_of(shape: str) -> bytes:
+    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}".encode().ljust(117) + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head + bytes(64)
+
+
+@pytest.mark.parametrize("shape", ["(3,", "(1000000000000000, 7), }", f"({10**20}, 7), }}", "(-3, 7), }"])
+@pytest.mark.parametrize("ending", ["npy", "npz"])
+def test_a_damaged_array_is_one_error(ending: str, shape: str, tmp_path: Path) -> None:
+    file = tmp_path / f"a.{ending}"
+    file.write_bytes(member_of(shape))
+    if ending == "npz":
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("a.npy", member_of(shape))
+    with pytest.raises(InputError, match=r"no archive of numpy|no array of numpy|is cut|no table"):
+        open_motion(file, units="rad")

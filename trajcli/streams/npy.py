@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from trajcli.columns import kinds_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.recorded.column_names import MOVE, TIME, read_name
 from trajcli.streams.recorded.column_roles import NamedFile
 from trajcli.streams.row_sources import EXACT, ArrayRows, unplaced
 
@@ -61,7 +63,7 @@ class ArrayFile:
         else:
             names, self.relative, notes = self._field_names()
         self.notes: tuple[str, ...] = tuple(notes)
-        self._rows = int(np.prod(self._shape[:-1] if self._plain else self._shape, dtype=np.int64))
+        self._rows = prod(self._shape[:-1] if self._plain else self._shape)
         self.named = NamedFile(source.file, tuple(names), unplaced)
 
     def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
@@ -115,7 +117,7 @@ class ArrayFile:
 def _names_of(field: str, shape: Sequence[int]) -> list[str]:
     """Return the names of the columns of a field, whose rows have a shape."""
     width = int(np.prod(shape, dtype=np.int64))
-    if not shape:
+    if not shape or (width == 1 and read_name(field).quantity in (TIME, MOVE)):
         return [field]
     kinds = kinds_of(field)
     return list(kinds) if len(kinds) == width else [f"{field}{joint + 1}" for joint in range(width)]
@@ -173,7 +175,9 @@ def open_archive(source: ByteSource, joints: int | None = None, *, timed: bool =
         names, notes = plain_names(source.file, array.shape, joints, timed=timed)
         columns = array.reshape(-1, array.shape[-1])
         return _rows_of(source.file, "npy", names, columns, [share_of(array.dtype)] * len(names), notes)
-    tables = [array for array in arrays.values() if array.ndim > 1] or list(arrays.values())
+    wide = {name: array for name, array in arrays.items() if 2 <= array.ndim <= 3}
+    of_joints = [array for name, array in wide.items() if read_name(f"{name}1").quantity == "q"]
+    tables = of_joints or list(wide.values()) or [array for array in arrays.values() if array.ndim == 1]
     if not tables or not tables[0].size:
         raise InputError(f"{source.file} holds no rows", hint=_LAYOUT)
     deep = tables[0].ndim > 2
@@ -213,12 +217,14 @@ def _rows_of(
 
 def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
     """Return the arrays of real numbers in an archive, by their names."""
+    import tokenize
     import zipfile
     import zlib
 
     from numpy.lib import format as npy
 
     found: dict[str, NDArray[Any]] = {}
+    wrong = (ValueError, zipfile.BadZipFile, EOFError, RuntimeError, tokenize.TokenError)
     try:
         with source.open() as stream, zipfile.ZipFile(stream) as archive:
             members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
@@ -230,7 +236,7 @@ def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
                     array = npy.read_array(content, allow_pickle=False)
                 if array.dtype.kind in "fiu" and array.ndim:
                     found[member.filename.removesuffix(".npy")] = array
-    except (ValueError, zipfile.BadZipFile, EOFError, RuntimeError, zlib.error) as error:
+    except (*wrong, zlib.error, OverflowError, MemoryError) as error:  # the last of what a header claims
         raise InputError(
             f"{source.file} is no archive of numpy: {error}".split("\n", maxsplit=1)[0]
         ) from error

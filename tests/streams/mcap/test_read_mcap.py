@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from streams.mcap.conftest import read_mcap, write_log
+from streams.mcap.conftest import plan_of, read_mcap, write_log
 
 from trajcli.errors import InputError
 from trajcli.knots import knots_of
@@ -114,6 +114,67 @@ def test_times_of_a_clock_count_from_the_first(tmp_path: Path) -> None:
     unstamped = [state(0, [1.0, 2.0, 3.0]) for _ in range(3)]
     motion = read_mcap(bag(tmp_path / "b.mcap", {"/x": (STATE, unstamped)}, clock=10**18))
     assert motion.times.tolist() == [0.0, 0.01, 0.02]
+
+
+def raw_messages(path: Path, times: list[int], channels: int, **options: object) -> Path:
+    """Write states by turns into several channels of one topic."""
+    from mcap.writer import Writer
+    from mcap_ros2._dynamic import serialize_dynamic
+
+    encode = serialize_dynamic(STATE, definition_of(STATE))[STATE]
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start("ros2", "somebody")
+        schema = writer.register_schema(STATE, "ros2msg", definition_of(STATE).encode())
+        known = [writer.register_channel("/x", "cdr", schema, {"by": str(k)}) for k in range(channels)]
+        for k, time in enumerate(times):
+            writer.add_message(
+                known[k % channels], 10**18 + k * 10**7, bytes(encode(state(time, [k, 0.0, 0.0]))), 0
+            )
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize("start", [0, 7 * 10**8])
+def test_one_stamp_of_zero_does_not_make_the_recorder_count(start: int, tmp_path: Path) -> None:
+    """Of a simulation that starts at 0, its messages in no chunks: each is a block of its own."""
+    times = [0, *(start + k * 10**7 for k in (1, 2, 3))]
+    path = raw_messages(tmp_path / "a.mcap", times, 1, use_chunking=False)
+    assert read_mcap(path).times.tolist() == [time / 1e9 for time in times]
+    path = raw_messages(tmp_path / "b.mcap", [0, 0, 0], 1, use_chunking=False)
+    assert read_mcap(path).times.tolist() == [0.0, 0.01, 0.02]
+
+
+def test_channels_of_one_topic_are_read_in_the_order_of_their_messages(tmp_path: Path) -> None:
+    times = [k * 10**7 for k in range(30)]
+    motion = read_mcap(raw_messages(tmp_path / "a.mcap", times, 3))
+    assert motion.times.tolist() == [time / 1e9 for time in times]
+    assert motion.position[:, 0].tolist() == list(range(30))
+
+
+def test_a_log_of_ours_may_begin_before_its_epoch(tmp_path: Path) -> None:
+    plan = plan_of("cubic", "output.start_time=-0.5", "output.rate=10")
+    motion = read_mcap(write_log(plan, tmp_path / "a.mcap", epoch="1767225600"))
+    assert motion.times[:6].tolist() == [-0.5, -0.4, -0.3, -0.2, -0.1, 0.0]
+    assert read_mcap(tmp_path / "a.mcap", "/joint_trajectory").times[0] == 0.0
+
+
+def test_an_index_that_ends_early_is_one_error(tmp_path: Path) -> None:
+    data = raw_messages(tmp_path / "a.mcap", [0, 10**7, 2 * 10**7], 1).read_bytes()
+    at, out = 8, data[:8]
+    while at < len(data) - 8:
+        kind, length = struct.unpack_from("<BQ", data, at)
+        content = data[at + 9 : at + 9 + length]
+        content = {7: content[:20], 2: bytes(20)}.get(kind, content)  # an index, and no summary
+        out += struct.pack("<BQ", kind, len(content)) + content
+        at += 9 + length
+    (tmp_path / "b.mcap").write_bytes(out + data[-8:])
+    assert "a record is damaged" in refused(tmp_path / "b.mcap")
+
+
+def test_a_trajectory_without_points_is_one_error(tmp_path: Path) -> None:
+    message = trajectory(1)[1] | {"points": []}
+    assert "it has no points" in refused(bag(tmp_path / "a.mcap", {"/goal": (TRAJECTORY, [message])}))
 
 
 def trajectory(count: int, *, accelerations: bool = True) -> tuple[np.ndarray, dict]:

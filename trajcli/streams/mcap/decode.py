@@ -17,7 +17,8 @@ from trajcli.frozen import comparable, frozen
 from trajcli.streams.mcap.cdr import Bytes
 
 _STATES = ("position", "velocity", "acceleration", "effort")
-_STAMP = (4, 8)  # where the stamp of a message stands, and its length
+STAMP = (4, 8)
+"""Where the stamp of a message stands, and its length, bytes."""
 
 
 class DamagedMessageError(ValueError):
@@ -220,7 +221,7 @@ def _fits(raw: Bytes, layout: StateLayout) -> NDArray[np.bool_]:
     """Return which messages (N, length) have the bytes of the first but for stamp and numbers."""
     fits = np.ones(len(raw), dtype=bool)
     low = 0
-    for at, length in (_STAMP, *layout.free, (layout.length, 0)):
+    for at, length in (STAMP, *layout.free, (layout.length, 0)):
         same = raw[:, low:at] == raw[0, low:at]
         if not same.all():  # of all bytes at once that is seen soonest
             fits &= same.all(axis=1)
@@ -249,6 +250,8 @@ def joint_trajectory(message: bytes) -> JointSeries:
     cursor.text()
     names = cursor.texts()
     count = cursor.number("I", 4)
+    if not count:
+        raise DamagedMessageError("it has no points")
     cursor.need(24 * count)
     times, states = np.empty(count, np.int64), []
     for k in range(count):

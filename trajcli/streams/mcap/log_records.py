@@ -55,10 +55,10 @@ class MessageBlock:
     data: Bytes
     offsets: dict[int, NDArray[np.int64]]
 
-    def heads(self, channel: int) -> NDArray[Any]:
-        """Return kind, length, channel, sequence and time of the records of a channel, (N,)."""
+    def heads(self, offsets: NDArray[np.int64]) -> NDArray[Any]:
+        """Return kind, length, channel, sequence and time of the records at some offsets, (N,)."""
         windows = np.lib.stride_tricks.sliding_window_view(self.data, _HEAD.itemsize)
-        return np.ascontiguousarray(windows[self.offsets[channel]]).view(_HEAD)[:, 0]
+        return np.ascontiguousarray(windows[offsets]).view(_HEAD)[:, 0]
 
 
 class LogRecords:
@@ -196,7 +196,7 @@ class LogRecords:
 
         try:
             yield
-        except (McapError, struct.error, UnicodeDecodeError, IndexError) as error:
+        except (McapError, struct.error, ValueError, IndexError) as error:
             raise self.wrong(f"a record is damaged ({type(error).__name__})") from error
 
     def _note(self, kind: int, content: bytes, checksum: int) -> None:
@@ -237,7 +237,7 @@ class LogRecords:
         for channel, offsets in found.items():
             if offsets.size and (offsets.min() < 0 or offsets.max() > len(data) - _HEAD.itemsize):
                 raise self.wrong("the index of a chunk points behind its end")
-            heads = block.heads(channel) if offsets.size else np.empty(0, _HEAD)
+            heads = block.heads(offsets) if offsets.size else np.empty(0, _HEAD)
             ends = offsets + records.RECORD_HEAD.size + heads["length"].astype(np.int64)
             right = (heads["kind"] == records.MESSAGE) & (heads["channel"] == channel) & (ends <= len(data))
             if not right.all() or (ends < offsets).any():

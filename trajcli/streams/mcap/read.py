@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import BinaryIO
 
 import numpy as np
@@ -15,6 +15,7 @@ from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.streams.mcap import definitions, records
 from trajcli.streams.mcap.decode import (
+    STAMP,
     DamagedMessageError,
     JointSeries,
     StateLayout,
@@ -30,6 +31,7 @@ from trajcli.suggest import did_you_mean, valid_names
 METADATA = "trajcli"
 _READ = (definitions.JOINT_STATE, definitions.JOINT_TRAJECTORY, definitions.CONTROLLER_STATE)
 _ARRAYS = ("times", "position", "velocity", "acceleration", "effort")  # of a motion
+_Layout = Callable[[bytes], StateLayout] | None
 _CLOCK = 10**17  # ns: stamps from here on (1973) are times of a clock, and counted from the first
 
 
@@ -82,8 +84,13 @@ def log_blocks(
     accelerations = _channels(known, JOINT_ACCELERATIONS) if own and chosen == JOINT_STATES else set()
     if accelerations:
         wanted[JOINT_ACCELERATIONS] = accelerations
-    clock, before = _Clock(own), 0
-    for series in _same_joints(_states(LogRecords(stream, file), known, wanted, field), file, chosen):
+    layouts = {c: _layouts(known, c, field) for channels in wanted.values() for c in channels}
+    states = {channel for channel in wanted[chosen] if layouts[channel] is not None}
+    unstamped = bool(states) and _unstamped(LogRecords(stream, file), states)
+    stream.seek(0)
+    clock, before = _Clock(own if states else {}), 0
+    parts = _states(LogRecords(stream, file), wanted, layouts, unstamped=unstamped)
+    for series in _same_joints(parts, file, chosen):
         motion = _motion(file, chosen, series, clock, before)
         before += motion.times.size
         yield motion
@@ -91,23 +98,41 @@ def log_blocks(
         raise InputError(f"the topic {chosen} of {file} has no messages")
 
 
+def _unstamped(log: LogRecords, channels: set[int]) -> bool:
+    """Return whether nobody has stamped the messages of a topic: then the times of the recorder count."""
+    for block in log.blocks():
+        for channel in channels & block.offsets.keys():
+            if not block.offsets[channel].size:
+                continue
+            whole = block.heads(block.offsets[channel])["length"] >= HEAD - records.RECORD_HEAD.size + sum(
+                STAMP
+            )
+            at = block.offsets[channel][whole] + HEAD + STAMP[0]
+            if block.data[at[:, None] + np.arange(STAMP[1])].any():
+                return False
+    return True
+
+
 def _states(
-    log: LogRecords, known: LogRecords, wanted: Mapping[str, set[int]], field: str | None
+    log: LogRecords, wanted: Mapping[str, set[int]], layouts: Mapping[int, _Layout], *, unstamped: bool
 ) -> Iterator[JointSeries]:
     """Yield the states of the first of some topics, with the accelerations of the second."""
-    layouts = {number: _layouts(known, number, field) for channels in wanted.values() for number in channels}
     pending: dict[str, list[JointSeries]] = {name: [] for name in wanted}
     trajectories = 0
     for block in log.blocks():
         for name, channels in wanted.items():
-            for channel in channels & block.offsets.keys():
-                count = block.offsets[channel].size
-                trajectories += count if layouts[channel] is None else 0
+            found = sorted(channels & block.offsets.keys())
+            for layout in dict.fromkeys(layouts[channel] for channel in found):
+                alike = [block.offsets[channel] for channel in found if layouts[channel] == layout]
+                offsets = alike[0] if len(alike) == 1 else np.sort(np.concatenate(alike))
+                trajectories += offsets.size if layout is None else 0
                 if trajectories > 1:
                     message = f"the topic {name} of {log.file} holds several trajectories, and one is read"
                     raise InputError(message)
-                if count:
-                    pending[name].append(_decoded(log, block, channel, name, layouts[channel]))
+                if offsets.size:
+                    series = _decoded(log, block, offsets, name, layout)
+                    times = block.heads(offsets)["time"].astype(np.int64)
+                    pending[name].append(replace(series, nanoseconds=times) if unstamped else series)
         yield from _paired(log.file, *pending.values())
     if any(part.nanoseconds.size for parts in pending.values() for part in parts):
         raise _other_stamps(log.file)
@@ -160,7 +185,7 @@ def _same_joints(parts: Iterable[JointSeries], file: str, topic: str) -> Iterato
             yield part
 
 
-def _layouts(known: LogRecords, channel: int, field: str | None) -> Callable[[bytes], StateLayout] | None:
+def _layouts(known: LogRecords, channel: int, field: str | None) -> _Layout:
     """Return where the parts of a channel's messages stand; None where each holds a trajectory."""
     kind, topic = _type(known, channel), known.channels[channel].topic
     if kind != definitions.CONTROLLER_STATE:
@@ -179,6 +204,12 @@ def _layouts(known: LogRecords, channel: int, field: str | None) -> Callable[[by
         near = None if field is None else did_you_mean(field, fields)
         message += "" if field is None else f", and no '{field}'"
         raise InputError(message, hint=near or f"choose one: --field {' or --field '.join(fields)}")
+    return _controller_layout(fields, field)
+
+
+@cache
+def _controller_layout(fields: tuple[str, ...], field: str) -> _Layout:
+    """Return where a field stands; the same function for the same fields."""
     return partial(controller_state_layout, fields=fields, field=field)
 
 
@@ -219,20 +250,16 @@ def _chosen(known: LogRecords, topic: str | None) -> str:
 def _decoded(
     log: LogRecords,
     block: MessageBlock,
-    channel: int,
+    offsets: NDArray[np.int64],
     topic: str,
-    layout: Callable[[bytes], StateLayout] | None,
+    layout: _Layout,
 ) -> JointSeries:
-    """Return the states in the messages of a channel in a block."""
-    heads = block.heads(channel)
-    starts = block.offsets[channel] + HEAD
-    lengths = heads["length"].astype(np.int64) - (HEAD - records.RECORD_HEAD.size)
+    """Return the states in messages of a topic in a block."""
+    starts = offsets + HEAD
+    lengths = block.heads(offsets)["length"].astype(np.int64) - (HEAD - records.RECORD_HEAD.size)
     try:
         if layout is not None:
-            series = joint_states(block.data, starts, lengths, layout)
-            # where nobody has stamped the messages, the recorder has
-            stamped = series.nanoseconds.any() or not heads["time"].any()
-            return series if stamped else replace(series, nanoseconds=heads["time"].astype(np.int64))
+            return joint_states(block.data, starts, lengths, layout)
         return joint_trajectory(block.data[starts[0] : starts[0] + lengths[0]].tobytes())
     except DamagedMessageError as error:
         raise log.wrong(f"a message of {topic} cannot be read: {error}") from error
@@ -250,7 +277,7 @@ class _Clock:
         if self.start is None:
             first = int(stamps[0])
             self.start = first if first >= _CLOCK else 0
-            if self._epoch.isdigit() and first >= int(self._epoch):
+            if self._epoch.isdigit():
                 self.start = int(self._epoch)
         return np.asarray((stamps - self.start) / 1e9)
 

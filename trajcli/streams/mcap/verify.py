@@ -90,7 +90,7 @@ class _StatesReadBack:
             self._counts[channel] = self._counts.get(channel, 0) + offsets.size
             topic = self._log.channels[channel].topic
             if topic in self._left and offsets.size:
-                lengths = block.heads(channel)["length"].astype(np.int64) - (HEAD - RECORD_HEAD.size)
+                lengths = block.heads(offsets)["length"].astype(np.int64) - (HEAD - RECORD_HEAD.size)
                 self._left[topic].append(joint_states(block.data, offsets + HEAD, lengths))
 
     def finish(self, rows: int, recording: Recording) -> None:
