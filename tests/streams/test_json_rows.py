@@ -100,3 +100,16 @@ def test_a_changed_message_is_a_motion_or_one_error(tmp_path_factory, at, text, 
     path.write_text(MESSAGE[:at] + text + MESSAGE[at + removed :])
     found = opened(path)
     assert found is None or np.isfinite(found.whole().q).all()
+
+
+@pytest.mark.parametrize("name", ["a.jsonl", "a"])
+def test_lines_as_others_write_them(name, tmp_path):
+    """With a mark of UTF-8 in front, blank lines, and keys in any order."""
+    text = '\ufeff\n{"t": 0, "q": [1, 2]}\n\n{"q": [3, 4], "t": 1}\r\n \n'
+    (tmp_path / name).write_bytes(text.encode())
+    motion = open_motion(tmp_path / name).whole()
+    assert (motion.t.tolist(), motion.q.tolist()) == ([0.0, 1.0], [[1.0, 2.0], [3.0, 4.0]])
+    (tmp_path / name).write_text(text + '{"t": 2, "qd": [3, 4]}\n', encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        open_motion(tmp_path / name)
+    assert caught.value.problems[0].place.line == 6

@@ -55,6 +55,8 @@ def test_what_is_written_is_read(tmp_path, digits):
         "t,q1\n\n0,1.5\n\n1,-2\n\n\n",
         't , "q1"\n0 , 1.5\n 1,\t-2 \n',
         "# t,q1\n0,1.5\n1,-2\n",
+        '"t","q1"\n"0","1.5"\n"1","-2"\n',
+        't;q1\n0;"1,5"\n"1";-2\n',
         "t,q1\n0.,+1.5e0\n.1E1,-200e-2\n",
         "t,q1\n0.000000000,1.500000000\n1.000000000,-2.000000000\n",
     ],
@@ -160,3 +162,16 @@ def test_a_dash_is_standard_input(monkeypatch):
     monkeypatch.setattr("sys.stdin", None)
     with pytest.raises(FileError, match="cannot read stdin: it is closed"):
         read_csv("-")
+
+
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+def test_decimal_commas_may_begin_behind_the_first_row(tmp_path, separator):
+    text = "t;q1;q2\n0;0;0\n1;2;3\n2;0,5;-4,25\n3;1;,5\n".replace(";", separator)
+    assert read(tmp_path, text).columns.tolist() == [[0, 0, 0], [1, 2, 3], [2, 0.5, -4.25], [3, 1, 0.5]]
+
+
+def test_a_comma_is_no_decimal_one_where_points_came_before(tmp_path):
+    """It may separate thousands."""
+    ((place, message),) = flaws(tmp_path, "t;q1;note\n0;1;1\n1;0.5;1\n2;1,234;1\n")
+    assert place.startswith("in.csv:4")
+    assert "q1 is '1,234'" in message or "the line has" in message

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,11 +40,11 @@ class JsonRows:
         """
         self._source, file = source, source.file
         with source.open() as stream:
-            line = stream.readline(_LONGEST)
+            first, line = next(_lines(stream), (0, b""))
         if not line:
             raise InputError(f"{file} has no rows")
-        value = _object(line, file, 1)
-        self._keys, self._columns, names = list(value), dict[str, int | None](), list[str]()
+        value = _object(line, file, first)
+        self._keys, self._columns, names = value.keys(), dict[str, int | None](), list[str]()
         for key, content in value.items():
             found = _names_of(key, content, file)
             names += found
@@ -52,7 +53,7 @@ class JsonRows:
         self._width = len(names)
         rest = [key for key in value if key not in self._columns]
         self.notes: tuple[str, ...] = (f"keys that are not read: {', '.join(rest)}",) if rest else ()
-        place = Place(file, 1, 1, line[:_SHOWN].decode("utf-8", "replace").rstrip())
+        place = Place(file, first, 1, line[:_SHOWN].decode("utf-8", "replace").rstrip())
         self.named = NamedFile(file, tuple(names), lambda name: place)
         self.relative = np.zeros(self._width)
         self._decimals = np.zeros(self._width, np.int64)
@@ -62,7 +63,7 @@ class JsonRows:
         del fixed  # numbers only
         rows: list[list[float]] = []
         with self._source.open() as stream:
-            for number, line in enumerate(iter(lambda: stream.readline(_LONGEST), b""), 1):
+            for number, line in _lines(stream):
                 rows.append(self._row(line, number))
                 if len(rows) == _BLOCK:
                     yield self._block(rows, taken)
@@ -92,11 +93,19 @@ class JsonRows:
             row += content if isinstance(content, list) else [content]
         place = Place(file, number, 1)
         lengths = all(_length(value.get(key)) == count for key, count in self._columns.items())
-        if list(value) != self._keys or not lengths:
+        if value.keys() != self._keys or not lengths:
             raise InputError(Problem("other keys or lists than in the first row", None, place))
         if not all(type(item) in (int, float) and abs(item) <= _LARGEST_NUMBER for item in row):
             raise InputError(Problem("a value is no number", None, place))
         return row
+
+
+def _lines(stream: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Yield the lines that are not blank, with their numbers from 1; a mark of UTF-8 in front is left out."""
+    for number, line in enumerate(iter(lambda: stream.readline(_LONGEST), b""), 1):
+        text = line.removeprefix(BOM_UTF8) if number == 1 else line
+        if text.strip():
+            yield number, text
 
 
 def _object(line: bytes, file: str, number: int) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -177,7 +178,7 @@ def format_of_rows(source: ByteSource) -> str:
             raise InputError(f"{source.file} is {what}, which is not read", hint=hint)
     if source.ending in _BY_ENDING:
         return _BY_ENDING[source.ending]
-    first = head.lstrip().split(b"\n", maxsplit=1)[0]
+    first = head.removeprefix(BOM_UTF8).lstrip().split(b"\n", maxsplit=1)[0]
     if first.startswith(b"{"):
         from trajcli.streams.json_rows import is_json_object
 

@@ -15,6 +15,9 @@ LONGEST_LINE = 1 << 16
 _MOST_COMMENTS = 1000  # lines in front of the names
 _NUMBER = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _LOCAL_NUMBER = re.compile(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
+_FIRST_DECIMALS = re.compile(
+    rb"(?:^|[;\t \"])[+-]?[0-9]*([.,])[0-9]+(?:[eE][+-]?[0-9]+)?(?=[;\t \"\r]|$)", re.MULTILINE
+)
 _COMMENT = (b"#", b"%")
 
 
@@ -143,6 +146,8 @@ class RowLayout:
 
     def plain(self, text: bytes) -> bytes:
         """Return whole lines with commas between cells, points in decimals and no blanks around cells."""
+        if self.decimal_comma:
+            text = text.replace(b",", b".")
         if self.separator == " ":
             text = text.replace(b"\t", b" ")
             while b"  " in text:
@@ -150,8 +155,6 @@ class RowLayout:
             text = text.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ").replace(b" ", b",")
         else:
             text = _without_blanks(text, self.separator.encode())
-            if self.decimal_comma:
-                text = text.replace(b",", b".")
             if self.separator != ",":
                 text = text.replace(self.separator.encode(), b",")
         return text.replace(b",\n", b"\n") if self.open_ended else text
@@ -189,13 +192,15 @@ def _without_blanks(text: bytes, separator: bytes) -> bytes:
     return text
 
 
-def layout_of(names: Sequence[str], header: str, first: bytes) -> RowLayout:
+def layout_of(names: Sequence[str], header: str, first: bytes, rows: bytes = b"") -> RowLayout:
     """Return how rows are written whose names and first row are these.
 
     Args:
         names: The columns' names.
         header: The line of names.
         first: The first row, without its line feed.
+        rows: More rows; where none of the first has decimals, their first number that has some says what
+            stands before these.
     """
     named = next((mark for mark in ";,\t" if mark in header), " ")
     line = first.rstrip(b"\r\n").decode("latin-1")
@@ -203,8 +208,8 @@ def layout_of(names: Sequence[str], header: str, first: bytes) -> RowLayout:
         cells = line.split() if separator == " " else line.split(separator)
         open_ended = separator != " " and len(cells) == len(names) + 1 and not cells[-1].strip()
         if len(cells) == len(names) + open_ended and (len(names) > 1 or separator == named):
-            local = separator != "," and any(
-                _LOCAL_NUMBER.fullmatch(cell.strip().encode("latin-1")) for cell in cells
-            )
+            local = any(_LOCAL_NUMBER.fullmatch(cell.strip().encode("latin-1")) for cell in cells)
+            mark = _FIRST_DECIMALS.search(rows)
+            local = separator != "," and (local or (mark is not None and mark[1] == b","))
             return RowLayout(separator, local, len(names), open_ended)
     return RowLayout(named, decimal_comma=False, width=len(names), open_ended=False)

@@ -83,7 +83,7 @@ class RowReader:
             if first is None:
                 self._line += text.count(b"\n")
                 return np.empty((0, len(self._taken)))
-            self._layout = layout_of(self._header.names, self._header.text, first)
+            self._layout = layout_of(self._header.names, self._header.text, first, text)
         layout = self._layout
         plain = text if text.endswith(b"\n") else text + b"\n"
         usual = layout.separator == "," and not layout.open_ended and self._fixed_form
@@ -159,11 +159,12 @@ class RowReader:
         return rows
 
     def _split(self, line: bytes) -> list[bytes]:
-        """Return the cells of a line; commas between quotation marks do not separate."""
+        """Return the cells of a line without quotation marks, between which commas do not separate."""
         if b'"' not in line:
             return line.split(b",")
         hidden = _QUOTED.sub(lambda match: match[0].replace(b",", b"\x1f"), line)
-        return [cell.replace(b"\x1f", b",") for cell in hidden.split(b",")]
+        cells = [cell.replace(b"\x1f", b",").strip() for cell in hidden.split(b",")]
+        return [cell[1:-1] if re.fullmatch(_QUOTED, cell) else cell for cell in cells]
 
     def _explain(self, text: bytes, layout: RowLayout) -> NoReturn:
         """Say what is wrong with the first of some lines that is wrong."""
@@ -181,7 +182,11 @@ class RowReader:
         """Return what is wrong with a line, what would fix it, and where; None where nothing is."""
         source, names = line.decode("utf-8", "replace"), self._header.names
         if '"' in source:
-            cells = list(enumerate((cell.decode("latin-1") for cell in self._split(line)), 1))
+            cells = list(
+                enumerate(
+                    (cell.decode("latin-1") for cell in self._split(layout.plain(line + b"\n")[:-1])), 1
+                )
+            )
         else:
             cells = layout.cells(source)
         if len(cells) != len(names):
