@@ -77,8 +77,6 @@ class StreamFormat:
         si: Whether its rows are SI, whatever the units of the job.
         text: Whether it is text, which a terminal can show.
         decimals: Whether its numbers may have nine decimals, or all their digits.
-        in_order: Whether the text of a block is final when it is written, and is read once and in order. Then
-            it is compared in memory, and the file by its checksum; otherwise the file is read block by block.
     """
 
     name: str
@@ -87,7 +85,6 @@ class StreamFormat:
     si: bool = True
     text: bool = True
     decimals: bool = False
-    in_order: bool = False
 
     def write(
         self, rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO, options: WriteOptions
@@ -156,9 +153,9 @@ def _made(make: Callable[[], T] | None) -> T:
 
 
 FORMATS: Mapping[FormatName, StreamFormat] = {
-    "csv": StreamFormat("CSV", _csv, si=False, decimals=True, in_order=True),
+    "csv": StreamFormat("CSV", _csv, si=False, decimals=True),
     "mcap": StreamFormat("MCAP", _mcap, "log", text=False),
-    "jsonl": StreamFormat("JSON lines", _jsonl, in_order=True),
+    "jsonl": StreamFormat("JSON lines", _jsonl),
     "npy": StreamFormat("NPY", _npy, text=False),
     "npz": StreamFormat("NPZ", _npz, text=False),
     "ros": StreamFormat("a ROS message", partial(_ros, message="ros"), "knots"),
@@ -223,7 +220,7 @@ def write_verified(
     Args:
         path: The file; its ending names the format. A device or pipe is written to directly, and not
             compared.
-        rows: Blocks of shape (N, m); each is compared with its text, and the finished file with all text.
+        rows: Blocks of shape (N, m); each is read back from the file and compared as soon as it is written.
         columns: What the rows hold, in the units that the columns say.
         options: What the rows do not say.
         form: The format, where the name does not say it.
@@ -240,16 +237,6 @@ def write_verified(
             stream_format.write(rows, columns, out, how)
             return
         write, verify = stream_format.functions(how)
-        if stream_format.in_order:
-            # whoever writes no file does not pay for the import
-            from trajcli.streams.checked_file import write_and_compare
-
-            write_and_compare(
-                out,
-                lambda text: write(rows, columns, text),
-                lambda text, blocks: verify(text, blocks, columns),
-            )
-            return
         with Path(out.name).open("rb") as back:
             verify(back, _flushed(write(rows, columns, out), out), columns)
 
