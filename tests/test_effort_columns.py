@@ -102,6 +102,15 @@ def test_at_a_border_the_later_move_says_what_is_carried(plan: Plan) -> None:
     assert row[1:] == pytest.approx(with_payload[0], rel=1e-9)
 
 
+def test_at_the_end_what_was_carried_there_is_said_whatever_is_put_down_then() -> None:
+    text = JOB[: JOB.index("  - {detach")] + "  - {detach: {}}\n" + JOB[JOB.index("output") :]
+    row = rows_of(plan_job(job_from_text(text)))[-1]
+    still = np.zeros((1, 2))
+    with_payload = lagrange(row[None, 1:3], still, row[None, 5:7], np.array([CARRIED]))
+    assert row[9] == 2
+    assert row[7:9] == pytest.approx(with_payload[0], rel=1e-9, abs=1e-9)
+
+
 def test_efforts_are_in_newton_metres_in_any_units(plan: Plan) -> None:
     degrees = rows_of(plan, Units("deg", "mm"))
     assert degrees[:, 7:9] == pytest.approx(rows_of(plan)[:, 7:9], rel=1e-12)

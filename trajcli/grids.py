@@ -46,7 +46,7 @@ class UniformGrid:
         if 1 / self.rate < finest:
             raise InputError(
                 f"the rate of {self.rate:g} Hz is too high: the times of neighbouring rows would be equal",
-                hint=f"from {self.start_time:g} s on, the rate can be at most {1 / finest:g} Hz",
+                hint=f"from {self.start_time:g} s on, the rate can be at most {1 / finest:.17g} Hz",
             )
 
     @property

@@ -163,20 +163,20 @@ class _Starts:
     """Where the spans of a trajectory start, gathered once for all blocks."""
 
     def __init__(self, trajectory: Trajectory) -> None:
-        # a move of no length has no rows
-        moving = [span for span in trajectory.spans if span.duration > 0] or list(trajectory.spans[:1])
-        self._moving = np.array([span.start for span in moving])
-        self._indices = np.array([span.index for span in moving], dtype=np.float64)
-        self._all = np.array([span.start for span in trajectory.spans])
+        # a move of no length has no rows, the last one neither
+        moving = [k for k, span in enumerate(trajectory.spans) if span.duration > 0] or [0]
+        self._moving = np.array(moving)
+        self._starts = np.array([trajectory.spans[k].start for k in moving])
+        self._indices = np.array([span.index for span in trajectory.spans], dtype=np.float64)
 
     def moves(self, local: Array) -> Array:
         """Return the index of the move at each time, shape (N,)."""
-        owner = np.searchsorted(self._moving, local + AT_BREAK, "right") - 1
-        return self._indices[np.maximum(owner, 0)]
+        return self._indices[self.spans(local)]
 
     def spans(self, local: Array) -> NDArray[np.intp]:
         """Return which span holds each time, shape (N,)."""
-        return np.searchsorted(self._all, local + AT_BREAK, "right") - 1
+        owner = np.searchsorted(self._starts, local + AT_BREAK, "right") - 1
+        return self._moving[np.maximum(owner, 0)]
 
 
 def _zones(trajectory: Trajectory, local: Array) -> Array:
@@ -194,7 +194,7 @@ def _path_law(trajectory: Trajectory, starts: _Starts, local: Array) -> Array:
     values = np.zeros((local.size, 3))
     owner = starts.spans(local)
     for index in np.unique(owner):
-        law = trajectory.laws[index] if 0 <= index < len(trajectory.laws) else None
+        law = trajectory.laws[index] if index < len(trajectory.laws) else None
         if law is not None:
             rows = np.flatnonzero(owner == index)
             times = np.clip(local[rows] - trajectory.spans[index].start, law.start, law.end)

@@ -197,12 +197,29 @@ WRONG_OPTIONS = [
     (("-o", "a.mcap", "--epoch", "3000000000"), "times of ROS 2 end at 2147483647 s"),
     (("-o", "a.mcap", "--epoch", "2147483646.5"), "the log would reach 2147483647.5 s"),
     (("-o", "a.mcap", "--set", "output.start_time=-2"), "--epoch 2 or more makes that possible"),
+    (
+        ("--rate", "50", "--set", "output.rows=knots"),
+        "--rate is about rows between the knots\n  leave it out, or say --rows both",
+    ),
     (("--report", "-"), "--report and the rows cannot both go to -"),
     (("-o", "a.csv", "--report", "./a.csv"), "--report and the rows cannot both go to ./a.csv"),
     (("--report", "a", "--resolved", "a"), "--resolved and --report cannot both go to a"),
     (("--rate", "x"), 'expected a frequency such as "500 Hz", got "x"'),
     (("--set", "x"), "--set x: expected PATH=VALUE"),
 ]
+
+
+@pytest.mark.parametrize("start", ["-0.12345649", "-1e-05", "-1234567.75", "-1.4e-9"])
+def test_the_earliest_time_of_a_log_is_one_that_is_taken(start: str, job: Path, capfd: Capture) -> None:
+    options = ("plan", job, "-o", "a.mcap", "--set", f"output.start_time={start}")
+    said = call(capfd, *options).err.split()
+    assert call(capfd, *options, "--epoch", said[said.index("--epoch") + 1]).code == 0
+
+
+def test_the_highest_rate_is_one_that_is_taken(job: Path, capfd: Capture) -> None:
+    options = ("plan", job, "--no-output", "--set", "output.start_time=1e9")
+    said = call(capfd, *options, "--rate", "1e7").err.split()
+    assert call(capfd, *options, "--rate", said[said.index("most") + 1]).code == 0
 
 
 @pytest.mark.parametrize(("options", "message"), WRONG_OPTIONS)

@@ -98,6 +98,26 @@ def test_about_a_corner_the_tool_enters_is_nearest_and_leaves(jerk: float | None
     assert inside == pytest.approx(fine[off.argmin()], abs=fine[1] - fine[0])
 
 
+@pytest.mark.parametrize("length", [100.0, 130.0, 210.0, 290.0])
+def test_the_whole_length_of_a_path_is_within_it_however_it_is_rounded(length: float) -> None:
+    """Without a zone, and where there is one about another corner."""
+    alone = planned(line(0, length, 0, at=[at({"path": length}), at({"path": -length}, value=2)]))
+    assert times_of(alone) == pytest.approx([0.0, alone.trajectory.duration], abs=1e-5)
+    moves = [line(0, 50, 0, zone=20), line(50, 0, 0), line(0, length, 0, at=[at({"path": length})])]
+    both = planned(*moves)
+    assert times_of(both) == pytest.approx([both.trajectory.duration], abs=1e-5)
+    with pytest.raises(InputError, match="along its path, which is"):
+        planned(line(0, length, 0, at=[at({"path": length * (1 + 1e-6)})]))
+
+
+def test_at_the_end_the_path_is_that_of_the_move_that_ends_there() -> None:
+    """Neither of what follows without length, nor of a line to where the arm is."""
+    plan = planned(line(0, 100, 0), line(0, 0, 0), {"signal": "s", "value": 1})
+    end = ListedGrid(plan.trajectory.duration, np.array([plan.trajectory.duration]))
+    row = np.concatenate(list(sample(plan.trajectory, end, ("path", "move"))))[0]
+    assert row == pytest.approx([0.1, 0.0, 0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.full
 def test_behind_a_zone_lengths_still_count_from_the_start_of_the_programmed_path() -> None:
     some = [at({"path": 40}), at({"path": 5})]

@@ -44,7 +44,7 @@ def plan_and_write(job: str, options: PlanCommand) -> Plan:
     loaded = load_job(job, options.override, rate=options.rate, rows=options.rows, si=options.si)
     wanted = _wanted(loaded, options)
     loaded = loaded if wanted is None else wanted[0]
-    refuse_overwriting(_outputs(options), files_of(loaded.document))
+    _check_beside_job(loaded, options)
     log = _log_options(options)
     if log is not None:
         from trajcli.output.recording import check_log_options
@@ -219,8 +219,6 @@ def _check_options(options: PlanCommand) -> StreamFormat:
     if options.rate is not None and form.content == "knots" and options.rows in (None, "knots"):
         hint = "leave --rate out, or say --rows rate"
         raise InputError(f"--rate is about rows, {form.name} has knots", hint=hint)
-    if options.rate is not None and options.rows == "knots":
-        raise InputError("--rate is about rows between the knots", hint="leave it out, or say --rows both")
     to_stream = options.output in (None, "-") and not options.no_output
     if to_stream and not form.text and sys.stdout is not None and sys.stdout.isatty():
         raise InputError(f"{form.name} is not written to a terminal", hint="name a file with -o")
@@ -243,6 +241,13 @@ def _outputs(options: PlanCommand) -> Iterator[tuple[str, str]]:
     for name, path in (("--report", options.report), ("--resolved", options.resolved)):
         if path is not None:
             yield name, path
+
+
+def _check_beside_job(loaded: LoadedJob, options: PlanCommand) -> None:
+    """Refuse a rate of the knots alone, and to write over a file that the job was read from."""
+    if options.rate is not None and loaded.job.output.rows == "knots":
+        raise InputError("--rate is about rows between the knots", hint="leave it out, or say --rows both")
+    refuse_overwriting(_outputs(options), files_of(loaded.document))
 
 
 def _report(

@@ -147,7 +147,7 @@ def _origin(options: LogOptions, start_time: float, duration: float = 0.0) -> in
     if origin < 0:
         raise InputError(
             f"a log begins at 0 s or later, and output.start_time is {start_time:g} s",
-            hint=f"--epoch {-start_time:g} or more makes that possible",
+            hint=f"--epoch {Decimal(epoch - origin) / _PER_SECOND:f} or more makes that possible",
         )
     end = origin / _PER_SECOND + duration
     if end > _LATEST:

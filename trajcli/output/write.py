@@ -81,7 +81,8 @@ def write_rows(
         units = Units() if form.si else loaded.output_units
         signals = [signal.name for signal in plan.trajectory.signals]
         columns = columns_of(groups, loaded.robot.joint_types, units, signals)
-        rows = _counted(sample(plan.trajectory, grid, groups, units, robot=loaded.robot_of_rows), grid.count)
+        robot = loaded.robot if form.content == "log" else loaded.robot_of_rows  # a log is in world
+        rows = _counted(sample(plan.trajectory, grid, groups, units, robot=robot), grid.count)
     if path is not None and path != "-":
         write_verified(path, rows, columns, options, form)
         return

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from trajcli.planners.planner import PlannedMove
     from trajcli.planning.flown_job import FlyBy
 
+_ROUNDING = 1e-9  # of a path's length: by so little one that is written may be off
 _NEAR = 65  # times at which a distance is looked at
 _CLOSER = 7  # times that its smallest value is enclosed anew, each time 32 times closer
 
@@ -104,8 +105,8 @@ def _time_along(
     if tool is None or tool.path is None or tool.pure_rotation:
         reason = "its tool turns where it is" if tool is not None and tool.pure_rotation else "it has none"
         raise InputError(f"no signal can be set along its path: {reason}", hint="say `when: nearest`")
-    s = along if along >= 0 else tool.path.length + along
-    if not 0 <= s <= tool.path.length:
+    s, near = along if along >= 0 else tool.path.length + along, _ROUNDING * tool.path.length
+    if not -near <= s <= tool.path.length + near:
         message = "a signal is set {asked} along its path, which is {length} long"
         hint = "write a length within it; one below zero counts from its end"
         amounts: Amounts = {
@@ -114,7 +115,7 @@ def _time_along(
         }
         raise InputError(Problem(message, hint, amounts=amounts))
     first, last = _range(tool)
-    if first <= s <= last:
+    if first - near <= s <= last + near:
         return begun + float(times_at(tool.law, np.array([s]))[0]) - tool.law.start
     end = begun if s < first else begun + tool.law.duration
     zone = min(zones, key=lambda times: min(abs(times[0] - end), abs(times[1] - end)))

@@ -55,6 +55,14 @@ def read(path: Path) -> dict[str, list[SimpleNamespace]]:
     return found
 
 
+def twists(topics: dict[str, list[SimpleNamespace]]) -> np.ndarray:
+    """Return linear and angular velocity (N, 6) of the messages of a twist."""
+    messages = [each.m.twist for each in topics["/tool_twist"]]
+    return np.array(
+        [[getattr(part, axis) for part in (m.linear, m.angular) for axis in "xyz"] for m in messages]
+    )
+
+
 def stamp(time) -> int:
     return time.sec * 10**9 + time.nanosec
 
@@ -101,10 +109,14 @@ def test_the_states_of_all_rows_are_there_bit_by_bit(pick: Plan, topics) -> None
 def test_the_twist_is_that_of_the_tool_in_world(pick: Plan, topics) -> None:
     rows = rows_of(pick)
     wanted = tcp_twist(pick.loaded.robot, rows[:, 1:7], rows[:, 7:13])
-    found = [[getattr(part, axis) for part in (m.twist.linear, m.twist.angular) for axis in "xyz"]
-             for m in (each.m for each in topics["/tool_twist"])]  # fmt: skip
-    assert np.array(found).tobytes() == np.ascontiguousarray(wanted).tobytes()
+    assert twists(topics).tobytes() == np.ascontiguousarray(wanted).tobytes()
     assert {each.m.header.frame_id for each in topics["/tool_twist"]} == {"world"}
+
+
+def test_the_twist_is_in_world_whatever_frame_the_columns_are_in(topics, tmp_path: Path) -> None:
+    turned = ("frames={f: {xyz: [0.1, 0.2, 0.3], rpy: [1.2, 0.3, -0.5]}}", "output.in=f")
+    seen = read(write_log(plan_of("ur5e_pick", *turned), tmp_path / "seen.mcap", topics="/tool_twist"))
+    assert twists(seen).tobytes() == twists(topics).tobytes()
 
 
 def test_the_trajectory_is_that_of_the_knots(pick: Plan, topics) -> None:
