@@ -281,6 +281,7 @@ WRONG = [
     ([], "empty list"),
     ({"joints": [0, 0]}, "expected a list"),
     ([{"joints": [0, 0, 0], "pose": POSE}], "expected 2 values"),
+    ([{"joints": {"j1": 0.1}, "pose": POSE}], "no value for j2"),
     ([{"joints": [0, 0]}], "pose"),
     ([{"joints": [0, 0], "pose": {}}], "says nothing"),
     ([{"joints": [0, 0], "pose": {"xyz": [None, None, None]}}], "no coordinate"),

@@ -220,3 +220,12 @@ def test_a_move_names_no_file(tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text(text)
     with pytest.raises(InputError, match="unknown key 'file'"):
         load_job(tmp_path / "job.yaml")
+
+
+def test_one_sided_limits_are_written_with_null_and_read_again(tmp_path: Path) -> None:
+    text = "joint_limits: {turn: {max_jerk: 3}, slide: {max_deceleration: -2, min_position: 1}}\n"
+    loaded = load(tmp_path, text)
+    assert of_joint(loaded, 1)["position"] == [1, inf]
+    assert of_joint(loaded, 1)["acceleration"] == [-2, inf]
+    again = job_from_text(dump_job(loaded))
+    assert [of_joint(again, joint) for joint in (0, 1)] == [of_joint(loaded, joint) for joint in (0, 1)]

@@ -162,7 +162,9 @@ def test_a_limit_of_one_joint_leaves_the_others(arm: Path) -> None:
     np.testing.assert_allclose(other.velocity, expected, rtol=1e-15)
     np.testing.assert_array_equal(other.position, plain.position)
     effort = load_job(arm, ["limits.effort.0=12"]).robot.limits.effort
-    assert effort.tolist() == [[-12, 12], [-150, 150], [-150, 150], *[[-28, 28]] * 3]
+    assert effort.tolist() == [[-12, 12], *[[-np.inf, np.inf]] * 5]  # the maker's are not in force
+    both = load_job(arm, ["limits.effort=robot", "moves.0.limits.effort.0=12"]).job.moves[0].limits
+    assert both.effort == ((-12, 12), (-150, 150), (-150, 150), *[(-28, 28)] * 3)
     once = load_job(arm, ["limits={velocity: [1, 2, 3, 4, 5, 6]}", "moves.0.limits.velocity.2=2"])
     assert once.job.moves[0].limits.velocity[2] == pytest.approx(np.radians([-2, 2]))
     assert once.job.moves[0].limits.velocity[5] == pytest.approx(np.radians([-6, 6]))
@@ -187,3 +189,86 @@ def test_what_nothing_takes_the_place_of_is_asked_for(arm: Path) -> None:
         "--set moves.0.to.xyz.0=3: the job has no moves.0.to.xyz, and nothing takes its place"
     )
     assert problem.hint == "write the whole of it: moves.0.to.xyz=[...]"
+
+
+IN_FORCE = [  # limits, setting, the limit of the move, of each joint, deg/s or deg/s^2
+    ("{velocity: 400}", "velocity.2=7", [400, 400, 7, 400, 400, 400]),
+    ("{velocity: {elbow_joint: 9}}", "velocity.2=7", [180, 180, 7, 180, 180, 180]),
+    ("{acceleration: 90}", "acceleration.2=7", [90, 90, 7, 90, 90, 90]),
+    ("{velocity: 100, scale: {velocity: 0.5}}", "velocity.0=7", [7, 50, 50, 50, 50, 50]),
+    ("{file: limits.yaml}", "velocity.0=7", [7, 180, 20, 180, 180, 180]),
+    ("{file: limits.yaml, velocity: {wrist_3_joint: 3}}", "velocity.0=7", [7, 180, 20, 180, 180, 3]),
+]
+
+
+@pytest.mark.parametrize(("limits", "setting", "expected"), IN_FORCE)
+def test_the_other_joints_of_a_limit_of_a_move_have_those_in_force(
+    arm: Path, limits: str, setting: str, expected: list[float]
+) -> None:
+    arm.with_name("limits.yaml").write_text(f"joint_limits: {{elbow_joint: {{max_velocity: {np.pi / 9}}}}}\n")
+    arm.write_text(ARM + f"limits: {limits}\n")
+    (move,) = load_job(arm, [f"moves.0.limits.{setting}"]).job.moves
+    bounds = getattr(move.limits, setting.partition(".")[0])
+    np.testing.assert_allclose(np.degrees(bounds)[:, 1], expected, rtol=1e-12)
+    np.testing.assert_array_equal(np.degrees(bounds)[:, 0], -np.degrees(bounds)[:, 1])
+
+
+def test_the_other_joints_of_a_limit_of_a_job_have_those_before_its_scale(arm: Path) -> None:
+    arm.with_name("limits.yaml").write_text(f"joint_limits: {{elbow_joint: {{max_velocity: {np.pi / 9}}}}}\n")
+    arm.write_text(ARM + "limits: {file: limits.yaml, scale: {velocity: 0.5}}\n")
+    limits = load_job(arm, ["limits.velocity.0=7"]).robot.limits
+    np.testing.assert_allclose(np.degrees(limits.velocity[:, 1]), [3.5, 90, 10, 90, 90, 90], rtol=1e-12)
+
+
+WRONG_BELOW = [  # the job's lines, settings, message of the first problem, its place
+    ("limits: {velocty: 3}", ["limits.velocity.0=7"], "unknown key 'velocty'", 6),
+    ("limits: 3", ["moves.0.limits.velocity.0=7"], "expected a mapping, got 3", 6),
+    (
+        "frames: {f: {xyz: no}}",
+        ["units.angle=degree", "base.xyz.0=1"],
+        'expected rad or deg, got "degree"',
+        1,
+    ),
+]
+
+
+@pytest.mark.parametrize(("more", "given", "message", "line"), WRONG_BELOW)
+def test_flaws_of_what_is_written_first_are_those_of_the_job(
+    arm: Path, more: str, given: list[str], message: str, line: int
+) -> None:
+    arm.write_text(ARM + more + "\n")
+    with pytest.raises(InputError) as refused:
+        load_job(arm, given)
+    first = next(problem for problem in refused.value.problems if problem.message == message)
+    assert first.place is not None
+    assert first.place.line == line
+
+
+BARE = [  # what a list is asked for
+    "moves.0.velocity",
+    "moves.0.deceleration",
+    "moves.0.attach.inertia",
+    "output.times",
+]
+
+
+@pytest.mark.parametrize("left_out", BARE)
+def test_a_list_that_is_left_out_is_asked_for(arm: Path, left_out: str) -> None:
+    with pytest.raises(InputError) as refused:
+        load_job(arm, [f"{left_out}.0=3"])
+    (problem,) = refused.value.problems
+    assert problem.message == f"--set {left_out}.0=3: the job has no {left_out}, and nothing takes its place"
+    assert problem.hint == f"write the whole of it: {left_out}=[...]"
+
+
+def test_a_number_of_the_tool_is_no_list(arm: Path) -> None:
+    with pytest.raises(InputError) as refused:
+        load_job(arm, ["limits.tcp.acceleration.0=3"])
+    assert refused.value.problems[0].message == "expected a number (mm/s^2), got a mapping"
+
+
+def test_the_arm_of_a_rail_that_an_option_names_is_placed_there(arm: Path) -> None:
+    arm.write_text(ARM.replace("robot: ur5e", "robot: {rail: {axis: x}, arm: ur5e}"))
+    with pytest.raises(InputError) as refused:
+        load_job(arm, ["robot.arm=ur55"])
+    assert str(refused.value.problems[0].place) == "--set robot.arm=ur55:1:1"

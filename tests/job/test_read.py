@@ -11,7 +11,8 @@ import pytest
 
 from trajcli.errors import FileError, InputError
 from trajcli.job.dump import dump_job
-from trajcli.job.read import LoadedJob, job_from_text, load_job
+from trajcli.job.read import LoadedJob, files_of, job_from_text, load_job
+from trajcli.job.yaml.load import parse_document
 from trajcli.kinematics.robot import Friction, LinkInertia
 from trajcli.planners.point_to_point.point_to_point import Hold
 from trajcli.planners.point_to_point.polynomial import Quintic
@@ -293,3 +294,20 @@ def test_impossible_dynamics_are_refused(old: str, new: str, message: str) -> No
     place = refused.value.problems[0].place
     assert place is not None
     assert place.line in (5, 6, 7)
+
+
+def test_files_of_places_are_files_of_the_job() -> None:
+    named = """\
+start: {csv: a.csv}
+moves:
+  - {planner: path, segments: {csv: b.csv, merge: 0}}
+  - {planner: spline, through: {csv: c.csv}}
+  - {repeat: 2, moves: [{planner: path, segments: {csv: d.csv}}, {planner: path, segments: {csv: b.csv}}]}
+  - {planner: path, segments: [{line: {xyz: [0, 0, 1]}}]}
+sequences: {one: [{planner: path, segments: {csv: e.csv}}]}
+"""
+    files = list(files_of(parse_document(named, "cell/job.yaml")))
+    assert files == [
+        ("the job", "cell/job.yaml"),
+        *(("the recording", str(Path(f"cell/{name}.csv"))) for name in "abcde"),
+    ]

@@ -80,6 +80,29 @@ def test_random_mappings_are_accepted_as_the_reader_does(plain: dict[str, Any]) 
     assert flaws("job", parse_document(dump_job(loaded), "resolved").plain()) == []
 
 
+ACCEPTED = [  # key, value
+    (
+        "moves",
+        [{"planner": "jerk_limited", "to": {"joints": 1}, "approach": {"distance": 0.1, "zone": 0.02}}],
+    ),
+    (
+        "moves",
+        [{"planner": "jerk_limited", "to": {"joints": 1}, "retreat": {"distance": 0.1, "zone": "stop"}}],
+    ),
+    (
+        "moves",
+        [{"planner": "line", "to": {"xyz": [1, 0, 0]}, "approach": {"distance": 1, "zone": {"joints": 1}}}],
+    ),
+    ("limits", {"acceleration": {"j1": [None, "2 rad/s^2"], "j2": [-1, None]}}),
+    ("robot", {"joints": [{"position": [-1, None], "jerk": [None, None]}]}),
+]
+
+
+@pytest.mark.parametrize(("key", "value"), ACCEPTED)
+def test_what_the_reader_takes_the_schema_accepts(key: str, value: Any) -> None:
+    assert flaws("job", {**JOB, key: value}) == []
+
+
 JOB: dict[str, Any] = {
     "version": 1,
     "robot": {"joints": 2},

@@ -22,7 +22,7 @@ from trajcli.job.read import LoadedJob
 from trajcli.job.robot import DH_ROW, RobotSheet
 from trajcli.kinematics.robot import GRAVITY, QUANTITIES, Robot
 from trajcli.language.dynamics import NamedTool, written_dynamics
-from trajcli.language.limits import ToolLimitsSpec
+from trajcli.language.limits import ToolLimitsSpec, written_bound
 from trajcli.language.numbers import ReadingContext, written_number
 from trajcli.language.per_joint import UNLIMITED
 from trajcli.language.poses import Pose
@@ -133,9 +133,7 @@ def _joint_as_mapping(
     row = {key: say(getattr(joint, key), DH_ROW[key]) for key in keys}
     bounds = [robot.limits.of_order(order)[index].tolist() for order in range(len(QUANTITIES))]
     limits = {
-        quantity: None
-        if (low, high) == UNLIMITED
-        else [say(end, joint_quantity(joint.type, order)) for end in (low, high)]
+        quantity: written_bound((low, high), joint_quantity(joint.type, order), say)
         for order, (quantity, (low, high)) in enumerate(zip(QUANTITIES, bounds, strict=True))
     }
     rates = robot.limits.velocity_by_position[index].tolist()

@@ -21,7 +21,8 @@ from trajcli.kinematics.calibration.measurements import MeasuredKind, Measuremen
 from trajcli.kinematics.inverse.target import IkTarget, partial_target
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import LARGEST_POSITION, Model, Number, ReadingContext, shown
-from trajcli.language.targets import JointPositions, PoseFields, ik_target
+from trajcli.language.per_joint import PerJoint
+from trajcli.language.targets import PoseFields, ik_target
 from trajcli.streams.table import Table, read_csv
 from trajcli.suggest import did_you_mean
 from trajcli.units import Quantity, Units
@@ -33,6 +34,7 @@ _AXES, _QUATERNION, _DEVIATIONS = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("p
 _OWN = tuple(f"sigma_{name}" for name in _DEVIATIONS)
 _YAML = (".yaml", ".yml", ".json")
 _MOST_PROBLEMS = 10
+_EveryJoint = Annotated[tuple[float, ...], PerJoint(0, "Position of each joint (angle or length unit).")]
 
 
 class DeviationSpec(Model):
@@ -49,7 +51,7 @@ class DeviationSpec(Model):
 class MeasurementSpec(Model):
     """A pose, or a part of one, measured at known joint values."""
 
-    joints: JointPositions
+    joints: _EveryJoint
     pose: PoseFields
     sigma: DeviationSpec | None = None
 
@@ -57,7 +59,7 @@ class MeasurementSpec(Model):
 class ConfigurationSpec(Model):
     """Joint values where a pose could be measured."""
 
-    joints: JointPositions
+    joints: _EveryJoint
     pose: PoseFields | None = None
     sigma: DeviationSpec | None = None
 

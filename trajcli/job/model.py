@@ -67,6 +67,18 @@ class UnitsSpec(Model):
         return Units(self.angle, self.length)
 
 
+def units_of(value: Any) -> Units:  # noqa: ANN401
+    """Return a file's units as far as they are right; what is wrong is reported with the rest."""
+    given = value if isinstance(value, Mapping) else {}
+    right: dict[str, Any] = {}
+    for key in ("angle", "length"):
+        try:
+            right |= {key: getattr(UnitsSpec.model_validate({key: given[key]}), key)} if key in given else {}
+        except ValidationError:
+            continue
+    return Units(**right)
+
+
 @comparable
 class RobotSource(FieldType):
     """A robot, with which the loader has replaced what names it."""

@@ -32,8 +32,14 @@ _BARE = (
     "direction",
     "through",
     "segments",
+    "inertia",
+    "times",
 )
 """Lists that a job leaves out without another taking their place."""
+_RATES = ("velocity", "acceleration", "deceleration")
+"""Likewise where they stand in a move."""
+_STATES = frozenset(("start", "points", "to", "through"))
+"""Keys of states, or of what holds them: rates that one leaves out are zero."""
 
 
 class Setting(NamedTuple):
@@ -122,7 +128,8 @@ def _written_out(document: Document, setting: Setting) -> Document:
         if default is not None:
             return _patched(document, Setting(setting.option, path[:depth], json.dumps(default)))
     for depth in lacking:
-        if isinstance(path[depth], int) and path[depth - 1] in _BARE:
+        in_move = depth > 1 and isinstance(path[depth - 2], int)
+        if isinstance(path[depth], int) and path[depth - 1] in (*_BARE, *(_RATES if in_move else ())):
             left_out = ".".join(map(str, path[:depth]))
             message = f"{setting.option}: the job has no {left_out}, and nothing takes its place"
             raise InputError(message, hint=f"write the whole of it: {left_out}=[...]")
@@ -152,21 +159,43 @@ def _default(document: Document, path: _Steps, step: str | int) -> Any:  # noqa:
         return list(Output.model_fields["columns"].default)
     if key == "com":
         return [0, 0, 0]
-    if "limits" in above and key != "tcp":
-        return _bounds_of_robot(document, path)
-    if key in ("velocity", "acceleration"):
+    if above[-1:] == ["limits"]:
+        return _bounds_in_force(document, path)
+    if key in ("velocity", "acceleration") and not _STATES.isdisjoint(above):
         return [0] * len(_robot(document).joints)
     return None
 
 
 def _robot(document: Document) -> Robot:
     """Return the robot of a job, as it is without the job's limits."""
-    from trajcli.job.model import UnitsSpec
+    from trajcli.job.model import units_of
     from trajcli.job.robot import find_sheet
 
     plain = document.plain()
-    units = UnitsSpec.model_validate(plain.get("units") or {}).as_units()
-    return find_sheet(plain.get("robot"), document, units).robot
+    return find_sheet(plain.get("robot"), document, units_of(plain.get("units"))).robot
+
+
+def _in_force(document: Document, *, scaled: bool) -> Robot:
+    """Return the robot of a job with the job's limits in force, as they are with or without its `scale`."""
+    from pydantic import ValidationError
+
+    from trajcli.job.files.moveit_limits import read_moveit_limits
+    from trajcli.job.limits import with_job_limits
+    from trajcli.job.messages import problems_of
+    from trajcli.job.model import units_of
+    from trajcli.language.limits import JobLimitsSpec, LimitsSpec, Scale
+    from trajcli.language.numbers import ReadingContext
+
+    robot, plain = _robot(document), document.plain()
+    context = ReadingContext(units_of(plain.get("units")), robot.joint_names, robot.joint_types)
+    try:
+        spec = JobLimitsSpec.model_validate(plain.get("limits", {}), context=context)
+    except ValidationError as error:
+        raise InputError(*problems_of(error, JobLimitsSpec, document, ("limits",))) from None
+    limits: LimitsSpec = spec if scaled else spec.model_copy(update={"scale": Scale()})
+    if spec.file is not None:
+        limits = read_moveit_limits(spec.file, document, robot).under(limits)
+    return with_job_limits(robot, limits)[0]
 
 
 def _pose_of_robot(document: Document, key: str) -> dict[str, Any]:
@@ -184,28 +213,21 @@ def _pose_of_robot(document: Document, key: str) -> dict[str, Any]:
     }
 
 
-def _bounds_of_robot(document: Document, path: _Steps) -> list[Any] | None:
-    """Return a limit of all joints, as the job says it above the move's, or as the robot has it."""
+def _bounds_in_force(document: Document, path: _Steps) -> list[Any] | None:
+    """Return a limit of all joints, as it counts where a job or a move does not say it."""
     from trajcli.kinematics.robot import QUANTITIES
-    from trajcli.language.numbers import written_number
+    from trajcli.language.limits import written_bound
     from trajcli.language.per_joint import UNLIMITED
     from trajcli.units import joint_quantity
 
-    of_job = document.node(("limits", path[-1]))
-    if of_job is not None and isinstance(of_job.value, list):
-        value: list[Any] = of_job.plain()
-        return value
-    robot = _robot(document)
-    if path[-1] == "effort":
-        return [None if joint.effort == UNLIMITED else list(joint.effort) for joint in robot.joints]
-    if path[-1] not in QUANTITIES:
+    if path[-1] not in (*QUANTITIES, "effort"):
         return None
+    robot = _in_force(document, scaled=path[0] != "limits")
+    if path[-1] == "effort":
+        return [None if tuple(row) == UNLIMITED else row for row in robot.limits.effort.tolist()]
     order = QUANTITIES.index(str(path[-1]))
     rows = zip(robot.joint_types, robot.limits.of_order(order).tolist(), strict=True)
-    return [
-        None if tuple(row) == UNLIMITED else [written_number(end, joint_quantity(kind, order)) for end in row]
-        for kind, row in rows
-    ]
+    return [written_bound((low, high), joint_quantity(kind, order)) for kind, (low, high) in rows]
 
 
 def _with(node: Node, steps: _Steps, new: Node, option: str) -> Node:

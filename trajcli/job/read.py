@@ -21,7 +21,7 @@ from trajcli.job.limits import (
     looser_tool_bounds,
     with_job_limits,
 )
-from trajcli.job.model import Job, UnitsSpec
+from trajcli.job.model import Job, units_of
 from trajcli.job.robot import RobotSheet, find_sheet
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
@@ -41,6 +41,8 @@ _STRUCTURES = frozenset(("repeat", "call", "approach", "retreat"))
 """Keys of entries among the moves that stand for other moves."""
 _GOALS = ("to", "through", "segments", "line", "arc", "point")
 """Keys under which an entry of the moves says where it ends, the last first."""
+_RECORDED = ("start", "through", "segments")
+"""Keys under which a file of places may be named."""
 _STAYS = frozenset(("planner", "duration", "label", "attach", "detach", "tool", "signal", "at", "defaults"))
 """Keys of entries that move nothing."""
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
@@ -235,23 +237,22 @@ def files_of(document: Document) -> Iterator[tuple[str, str]]:
     limits = root.get("limits")
     if isinstance(limits, Mapping) and isinstance(limits.get("file"), str):
         yield "the file of limits", str(folder / limits["file"])
-    lists = [root.get("moves"), *(sequences.values() if isinstance(sequences, Mapping) else ())]
+    lists = [[root], root.get("moves"), *(sequences.values() if isinstance(sequences, Mapping) else ())]
     recordings = dict.fromkeys(path for moves in lists for path in _recordings(moves))
     yield from (("the recording", str(folder / path)) for path in recordings)
 
 
 def _recordings(moves: Any) -> Iterator[str]:  # noqa: ANN401
-    """Yield the files of points of a list of moves, those that are repeated counted."""
+    """Yield the files of a start and of a list of moves, those that are repeated counted."""
     for move in moves if isinstance(moves, list) else []:
-        through = move.get("through") if isinstance(move, Mapping) else None
-        if isinstance(through, Mapping) and isinstance(through.get("csv"), str):
-            yield through["csv"]
+        places = [move.get(key) for key in _RECORDED] if isinstance(move, Mapping) else []
+        yield from (at["csv"] for at in places if isinstance(at, Mapping) and isinstance(at.get("csv"), str))
         if isinstance(move, Mapping) and "repeat" in move:
             yield from _recordings(move.get("moves"))
 
 
 def _load(document: Document) -> LoadedJob:
-    units = _units(_plain(document.node(("units",))))
+    units = units_of(_plain(document.node(("units",))))
     document = _expanded(document, units)
     plain = dict(document.plain())
     problems: list[Problem] = []
@@ -445,18 +446,6 @@ def _of_joint(path: tuple[str | int, ...], joint: int, robot: Robot) -> list[tup
 
 def _position(problem: Problem) -> tuple[str, int, int]:
     return (problem.place.file, problem.place.line, problem.place.column) if problem.place else ("", 0, 0)
-
-
-def _units(value: Any) -> Units:  # noqa: ANN401
-    """Return the file's units as far as they are right; what is wrong is reported with the rest."""
-    given = value if isinstance(value, Mapping) else {}
-    right: dict[str, Any] = {}
-    for key in ("angle", "length"):
-        try:
-            right |= {key: getattr(UnitsSpec.model_validate({key: given[key]}), key)} if key in given else {}
-        except ValidationError:
-            continue
-    return Units(**right)
 
 
 def _base(value: Any, context: ReadingContext, robot: Robot) -> np.ndarray:  # noqa: ANN401

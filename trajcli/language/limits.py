@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import isfinite
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -32,7 +34,7 @@ from trajcli.units import Quantity
 
 
 def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> LowerUpper:  # noqa: ANN401
-    """Return (lower, upper) in SI from a magnitude, a pair by direction, or null for unlimited.
+    """Return (lower, upper) in SI from a magnitude, a pair by direction, or null for unlimited, ends too.
 
     Raises:
         FlawError: When it is none of these, or the pair is the wrong way round.
@@ -64,21 +66,24 @@ def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Lower
 
 def _read_end(value: Any, index: int, quantity: Quantity, context: ReadingContext) -> float:  # noqa: ANN401
     try:
-        return read_number(value, quantity, context.units)
+        return UNLIMITED[index] if value is None else read_number(value, quantity, context.units)
     except FlawError as error:
         raise FlawError(str(error), index, hint=error.flaws[0][2]) from None
 
 
-def written_bound(bound: LowerUpper, quantity: Quantity) -> list[float | str] | None:
+def written_bound(
+    bound: LowerUpper, quantity: Quantity, say: Callable[[float, Quantity], float | str] = written_number
+) -> list[float | str | None] | None:
     """Return (lower, upper) in SI as it may stand in a file of any units, to be read bit by bit."""
-    return None if bound == UNLIMITED else [written_number(end, quantity) for end in bound]
+    return None if bound == UNLIMITED else [say(end, quantity) if isfinite(end) else None for end in bound]
 
 
 def _bound_schema(order: int) -> JsonSchemaValue:
     # a length has the wider bounds: whether the joint slides is not known to a schema
     number = Number(Quantity("length", order), "", above=0.0).json_schema()
     signed = Number(Quantity("length", order), "").json_schema()
-    pair = {"type": "array", "items": signed, "minItems": 2, "maxItems": 2}
+    end = {"anyOf": [signed, {"type": "null"}]}
+    pair = {"type": "array", "items": end, "minItems": 2, "maxItems": 2}
     return {"anyOf": [number, pair, {"type": "null"}]}
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
-from trajcli.errors import InputError
+from trajcli.errors import InputError, Place
+from trajcli.frozen import frozen
 from trajcli.job.yaml.document import Document
 from trajcli.kinematics.carriage import on_carriage
 from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Robot
@@ -64,12 +66,24 @@ class RobotOnRail(Model):
     ] = None
 
 
+@frozen
+class _DocumentOfArm(Document):
+    """A job's document with the arm of its rail in the place of its robot; places are those of the job."""
+
+    whole: Document
+
+    def place(self, path: Sequence[str | int], *, key: bool = False) -> Place:
+        """Return where the deepest existing node on the path stands in the whole."""
+        below = ("robot", "arm", *path[1:]) if path[:1] == ("robot",) else path
+        return self.whole.place(below, key=key)
+
+
 def document_of_arm(document: Document) -> Document:
     """Return a job's document with the arm of its rail in the place of its robot."""
     arm, root = document.node(("robot", "arm")), document.root
     if arm is not None and isinstance(root.value, dict):
         root = root._replace(value={**root.value, "robot": arm})
-    return Document(document.file, document.lines, root)
+    return _DocumentOfArm(document.file, document.lines, root, document)
 
 
 def arm_on_rail(model: RobotOnRail, arm: Robot) -> Robot:

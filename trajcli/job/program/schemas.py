@@ -57,6 +57,10 @@ STRAIGHT = {
                 },
                 "frame": {**_NAME, "default": "tool", "description": "Whose axis: tool, world or a frame."},
                 "law": {"$ref": "#/$defs/LawSpec"},
+                "zone": {
+                    "$ref": "#/properties/zone",
+                    "description": "Zone about the point before, or behind; left out: the job's.",
+                },
             },
             "distance",
             description="A straight part of a move.",
