@@ -63,7 +63,8 @@ velocity or an acceleration, the joints that are left out are zero; of limits, t
 _BOUNDS = """\
 A bound is a number above 0 (it holds in both directions), a pair `[lower, upper]` by direction, or
 `null`: unlimited, not checked, and the report says so. A pair for a velocity, acceleration or jerk has
-a negative and a positive number. Under `limits` a list always has one entry for each joint; to give one
+a negative and a positive number; `null` at one end of a pair (not of an effort's) leaves that end open.
+Under `limits` a list always has one entry for each joint; to give one
 joint a pair, name it: `{j1: [-90, 120]}`."""
 
 _LIMITS = """\

@@ -13,7 +13,8 @@ from planned_examples import planned_example
 from random_mappings import jobs
 from tiers import few
 
-from trajcli.job.dump import dump_job
+from trajcli.errors import InputError
+from trajcli.job.dump import dump_job, mapping_text
 from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.planners.planner import Planner
 from trajcli.planning.plan import plan_job
@@ -133,3 +134,11 @@ def test_names_survive(name: str) -> None:
     plain |= {"points": {point: {"joints": 2}}, "moves": [{"planner": "cubic", "to": point, "duration": 1}]}
     first = job_from_text(json.dumps(plain, ensure_ascii=name.isascii() or not name.isprintable()))
     assert_same(first, job_from_text(dump_job(first)))
+
+
+@pytest.mark.parametrize("number", [10**5000, -(10**5000), 2**1024], ids=["long", "below", "next"])
+def test_whole_numbers_beyond_floats_are_refused(number: int) -> None:
+    with pytest.raises(
+        InputError, match=r"the job's moves\.1\.duration: too large: a number is at most 1\.8e"
+    ):
+        mapping_text({"moves": [{"duration": 2**1023}, {"duration": number}]})

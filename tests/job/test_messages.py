@@ -176,3 +176,35 @@ def test_fields_of_the_law_beside_it_are_shown_where_they_stand(words: str, law:
 def test_a_radius_belongs_to_a_path() -> None:
     problem = problems_of(LINE.replace("WORDS", "radius: 10"))[0]
     assert "corner: round, radius: " in (problem.hint or "")
+
+
+EULER = "{xyz: [0.4, 0, 0.3], euler: {angles: [0, 0, 0]}}"
+TAGS = [  # lines, the first message, its hint; keys and names of points are those of planners and entries
+    (f"moves: [{{planner: path, segments: [{{line: {EULER}}}]}}]", "`sequence` is missing", "the axes"),
+    ("moves: [{planner: path, segments: [{line: {axis_angle: {axis: z}}}]}]", "`angle` is missing", "angle"),
+    ("moves: [{planner: path, segments: [{line: {rpyy: 0}}]}]", "unknown key 'rpyy'", "did you mean 'rpy'?"),
+    (f"points: {{hold: {EULER}}}", "`sequence` is missing", "the axes"),
+    (f"points: {{attach: {EULER}}}", "`sequence` is missing", "the axes"),
+    ("points: {euler: {rpyy: 0}}", "unknown key 'rpyy'", "did you mean 'rpy'?"),
+    ("points: {path: {rpyy: 0}}", "unknown key 'rpyy'", "did you mean 'rpy'?"),
+    ("sequences: {line: [{attach: {mass: 1, come: 0}}]}", "unknown key 'come'", "did you mean 'com'?"),
+]
+
+
+@pytest.mark.parametrize(("lines", "message", "hint"), TAGS)
+def test_names_that_planners_have_too(lines: str, message: str, hint: str) -> None:
+    moves = "" if lines.startswith("moves") else "moves: [{planner: hold, duration: 1}]\n"
+    text = f"version: 1\nrobot: ur5e\nstart: {{joints: 0}}\n{lines}\n{moves}"
+    problem = problems_of(text)[0]
+    assert problem.message == message
+    assert (problem.hint or "").startswith(hint)
+
+
+@pytest.mark.parametrize("point", ["halt", "{velocity: 0}"])
+def test_a_state_that_is_no_waypoint_is_refused_where_it_is_named(point: str) -> None:
+    line = f"  - {{planner: spline, through: [home, {point}, home]}}\n"
+    text = JOB.replace("start:", "  halt: {velocity: 0}\nstart:") + line
+    (problem,) = problems_of(text)
+    assert problem.message == "a waypoint needs `joints` or a pose"
+    assert problem.place is not None
+    assert (problem.place.line, underlined(problem)) == (10, point)

@@ -272,3 +272,8 @@ def test_the_arm_of_a_rail_that_an_option_names_is_placed_there(arm: Path) -> No
     with pytest.raises(InputError) as refused:
         load_job(arm, ["robot.arm=ur55"])
     assert str(refused.value.problems[0].place) == "--set robot.arm=ur55:1:1"
+
+
+def test_an_index_of_any_length_is_none_of_the_list(path: Path) -> None:
+    with pytest.raises(InputError, match="in a list of 1 entry"):
+        load_job(path, [f"moves.{'1' * 5000}.duration=3"])

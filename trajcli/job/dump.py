@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from math import isfinite, isnan
 from pathlib import PurePath
+from sys import float_info
 from typing import Any
 
 import numpy as np
@@ -171,6 +172,8 @@ def _plain(value: Any, path: tuple[str | int, ...]) -> Any:  # noqa: ANN401
         return {str(key): _plain(item, (*path, key)) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item, (*path, index)) for index, item in enumerate(value)]
+    if isinstance(value, int) and value.bit_length() > float_info.max_exp:
+        raise InputError(f"{_path_text(path)}: too large: a number is at most {float_info.max:.1e}")
     if value is None or isinstance(value, str | bool | int | float):
         return value
     raise InputError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -165,8 +165,13 @@ def _flaws(
 
 def _without_key_of_entry(loc: FieldPath) -> FieldPath:
     """Return the path without the tag of an entry among the moves, which is a key of it, too."""
-    at = {"moves": 2, "sequences": 3}.get(str(loc[0]), len(loc)) if loc else 0
+    at = _tag_at(loc)
     return (*loc[:at], *loc[at + 1 :]) if loc[at : at + 1] and loc[at] in HANDLING else loc
+
+
+def _tag_at(loc: FieldPath) -> int:
+    """Return where in a path the tag of an entry among the moves stands, if it is that long."""
+    return {"moves": 2, "sequences": 3}.get(str(loc[0]), len(loc)) if loc else 0
 
 
 def _flaw(path: FieldPath, text: str, hint: str | None) -> tuple[FieldPath, str, str | None, bool]:
@@ -309,14 +314,14 @@ def _field_names(model: type[BaseModel], loc: FieldPath) -> list[str]:
 
 
 def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:
-    current = model
-    for step in loc:
-        if isinstance(step, str) and step in PLANNERS:
-            current = PLANNERS[step]
-        elif isinstance(step, str) and step in HANDLING and step not in current.model_fields:
-            current = HANDLING[step]
-        elif isinstance(step, str) and step in current.model_fields:
-            current = _model_in(current.model_fields[step].annotation) or current
+    current, named = model, False  # whether the next step is a name that the user chose
+    for index, step in enumerate(map(str, loc)):
+        field = None if named else current.model_fields.get(step)
+        named = field is not None and get_origin(field.annotation) is dict
+        if index == _tag_at(loc) and (step in PLANNERS or step in HANDLING):
+            current = PLANNERS[step] if step in PLANNERS else HANDLING[step]
+        elif field is not None:
+            current = _model_in(field.annotation) or current
     return current
 
 

@@ -63,7 +63,9 @@ def parse_setting(text: str, option: str = "--set") -> Setting:
         InputError: When it is not of that form.
     """
     name, equals, value = text.partition("=")
-    steps = tuple(int(step) if step.isdecimal() else step for step in name.strip().split("."))
+    steps = tuple(
+        int(step) if step.isdecimal() and len(step) < _QUOTED else step for step in name.strip().split(".")
+    )
     if not equals or "" in steps:
         raise InputError(f"{option} {text}: expected PATH=VALUE", hint=f"such as {option} moves.0.duration=3")
     if len(steps) > MAX_DEPTH:

@@ -160,7 +160,7 @@ class LoadedJob:
             moving = moving or key is not None or not _STAYS.issuperset(below)
             node = None if key is None else below[key]
         if node is not None and node.value in self.job.points:
-            return str(node.value).partition(" (")[0]  # of a point of many the round says which
+            return self.document.without_round(str(node.value))
         return "" if moving else None
 
     def place_of_move(self, index: int) -> Place:

@@ -20,8 +20,8 @@ _LONGEST_CHAIN = 100  # frames, each in the next
 _UPRIGHT = 1e-9  # rad from the vertical: rounding
 
 
-class _CircleError(FlawError):
-    """A frame that is given in itself, which is said once: of the frame that is read first."""
+class _ChainError(FlawError):
+    """A frame that is given in itself, or in too many: said where the frame that is read first stands."""
 
 
 def frame_named(name: Any, context: ReadingContext, chain: tuple[str, ...] = ()) -> Array:  # noqa: ANN401
@@ -49,18 +49,19 @@ def frame_named(name: Any, context: ReadingContext, chain: tuple[str, ...] = ())
     if name in chain:
         circle = chain[chain.index(name) :]
         context.circular.update(circle)
-        raise _CircleError(f"the frame '{name}' is given in itself ({' -> '.join([*circle, name])})")
+        raise _ChainError(f"the frame '{name}' is given in itself ({' -> '.join([*circle, name])})")
     if name in context.circular:
         error = FlawError(f"the frame '{name}' is given in itself")
         error.flaws = []
         raise error
     if len(chain) == _LONGEST_CHAIN:
-        raise FlawError(f"more than {_LONGEST_CHAIN} frames stand one in the next", hint="give one in world")
+        text = f"more than {_LONGEST_CHAIN} frames stand one in the next"
+        raise _ChainError(text, hint="give one in world")
     if name not in context.placed:
         try:
             context.placed[name] = pose_of_frame(context.frames[name], context, (*chain, name))
-        except _CircleError as error:
-            raise _CircleError(str(error)) from None
+        except _ChainError as error:
+            raise _ChainError(str(error), hint=error.flaws[0][2]) from None
         except FlawError as error:
             error.flaws = []
             raise

@@ -165,8 +165,19 @@ def _of_name(name: str, validate: core_schema.ValidatorFunctionWrapHandler, cont
         if isinstance(state, Mapping) and ("from" in state or "in" in state):
             state = _of_point(names[-1], context)
         return validate(state)
-    except (FlawError, ValidationError):
+    except (FlawError, ValidationError) as error:
+        if isinstance(error, ValidationError) and _is_target(state, context):
+            raise  # nothing is wrong where the point stands: it cannot stand here
         raise refuse([]) from None
+
+
+def _is_target(state: Any, context: ReadingContext) -> bool:  # noqa: ANN401
+    """Return whether the state of a point is one, whatever a list of points asks of it."""
+    try:
+        Target.model_validate(state, context=context)
+    except ValidationError:
+        return False
+    return True
 
 
 def _names_from(name: str, context: ReadingContext) -> list[str]:

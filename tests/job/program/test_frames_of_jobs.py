@@ -215,3 +215,18 @@ def test_wrong_frames_are_refused_on_their_line(frames: str, points: str, line: 
     assert message in problem.message
     assert problem.place is not None
     assert problem.place.line == line
+
+
+def test_a_long_chain_of_frames_is_refused_where_it_begins() -> None:
+    def job(count: int) -> str:
+        chain = "".join(f"  f{k}: {{in: f{k + 1}, xyz: [0, 0, 1]}}\n" for k in range(count - 1))
+        last = f"  f{count - 1}: {{xyz: [0, 0, 0]}}\npoints: {{p: {{in: f0, xyz: [0, 0, 0]}}}}\n"
+        return f"{HEAD}frames:\n{chain}{last}{MOVES}"
+
+    assert job_from_text(job(100)).job.points["p"].xyz == pytest.approx((0, 0, 0.099))
+    with pytest.raises(InputError) as caught:
+        job_from_text(job(102))
+    problems = caught.value.problems
+    assert {problem.message for problem in problems} == {"more than 100 frames stand one in the next"}
+    assert {problem.hint for problem in problems} == {"give one in world"}
+    assert [problem.place.source[:4] for problem in problems if problem.place] == ["  f0", "poin"]

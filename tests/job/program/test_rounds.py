@@ -267,3 +267,69 @@ def test_calls_grow_as_the_places_of_a_pallet() -> None:
     _calls(2)  # what is made once
     few, more, many = (_calls(rows) for rows in (3, 5, 11))
     assert many - more < 1.02 * 3 * (more - few)
+
+
+def nested(sequences: int, repeats: int, calls: str = "{call: s0}") -> str:
+    """Return sequences that call one another, each within several repeats."""
+    lines = []
+    for index in range(sequences):
+        inner = "{planner: hold, duration: 1}" if index == sequences - 1 else f"{{call: s{index + 1}}}"
+        for _ in range(repeats):
+            inner = f"{{repeat: 1, moves: [{inner}]}}"
+        lines.append(f"  s{index}: [{inner}]\n")
+    return f"sequences:\n{''.join(lines)}moves: [{calls}]\n"
+
+
+BACKWARDS = ", ".join(f"{{call: s{index}}}" for index in reversed(range(1200)))
+DEEP = [  # each is refused before the stack is full
+    nested(100, 13),
+    nested(1200, 0, BACKWARDS),
+]
+
+
+@pytest.mark.parametrize("text", DEEP, ids=["repeats", "calls"])
+def test_what_is_nested_too_deep_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="more than 300 repeats and calls stand one in another") as caught:
+        job_from_text(HEAD + text)
+    assert caught.value.problems[0].place is not None
+
+
+def test_what_is_nested_within_the_bound_is_read() -> None:
+    assert len(job_from_text(HEAD + nested(100, 2)).job.moves) == 1
+    with pytest.raises(InputError, match="more than 100 sequences call one another"):
+        job_from_text(HEAD + nested(101, 1))
+    circle = nested(2, 1).replace("{planner: hold, duration: 1}", "{call: s0}")
+    with pytest.raises(InputError, match=r"calls itself \(s0 -> s1 -> s0\)"):
+        job_from_text(HEAD + circle)
+
+
+@pytest.mark.parametrize("link", ["{from: p%d, offset: {xyz: [0, 0, 1]}}", "p%d"])
+def test_a_long_chain_to_a_place_of_a_grid_is_refused(link: str) -> None:
+    def job(count: int) -> str:
+        chain = "".join(f"  p{index}: {link % (index + 1)}\n" for index in range(count - 1))
+        grid = f"  p{count - 1}: {{grid: {{from: corner, steps: [{{count: 2, xyz: [1, 0, 0]}}]}}}}\n"
+        move = f"moves: [{{repeat: p{count - 1}, moves: [{{planner: jerk_limited, to: p0}}]}}]\n"
+        return f"{HEAD}points:\n{CORNER}{chain}{grid}{move}"
+
+    assert len(job_from_text(job(100)).job.moves) == 2
+    with pytest.raises(
+        InputError, match="more than 100 points and frames are given one by the next"
+    ) as caught:
+        job_from_text(job(1000))
+    place = caught.value.problems[0].place
+    assert place is not None
+    assert place.source.startswith("  p100:")
+
+
+def test_titles_leave_out_the_round_of_a_point_and_no_part_of_its_name() -> None:
+    text = PALLET.replace("above", '"above (left)"') + '  - {planner: jerk_limited, to: "above (left)"}\n'
+    with pytest.raises(InputError, match="is many"):
+        job_from_text(HEAD + text)
+    text = PALLET.replace("above", '"above (left)"').replace("home", '"shelf (left)"')
+    loaded = job_from_text(HEAD + text)
+    assert [loaded.ends(index) for index in range(4)] == [
+        "-> above (left)",
+        "above (left) -> slot 1 of 6",
+        "",
+        "slot 1 of 6 -> shelf (left)",
+    ]

@@ -15,6 +15,7 @@ from trajcli.suggest import did_you_mean, valid_names
 from trajcli.units import Units
 
 _LONGEST_CHAIN = 100  # sequences, each called by the one before
+_DEEPEST = 300  # repeats and calls, each within the one before
 _Path = tuple[str | int, ...]
 
 
@@ -60,6 +61,11 @@ class ExpandedDocument(Document):
     def round_of(self, move: int) -> str:
         """Return in which round of a repeat a move is reached; empty outside of any."""
         return self.entries[move].rounds
+
+    def without_round(self, point: str) -> str:
+        """Return the name of a point as it is written, without the round in which it is that."""
+        name = str(self.made.get(("points", point), (point,))[-1])
+        return name if point.startswith(f"{name} (") else point
 
     def _written(self, path: _Path) -> _Path:
         if path[:1] == ("moves",) and path[1:] and isinstance(path[1], int) and path[1] < len(self.entries):
@@ -164,7 +170,11 @@ class _Expansion:
         return list(self._entries(self._sequences[name], path, first, ""))
 
     def _count(self, listed: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
-        """Return how many entries a list of moves becomes; refuse what is wrong with its repeats."""
+        """Return how many entries a list of moves becomes; refuse what is wrong with its repeats.
+
+        The chain holds what the list stands in: the names of sequences, and an empty one for a repeat.
+        """
+        self._not_too_deep(len(chain), path)
         if not isinstance(listed.value, list):
             raise self._names.refused("expected a list of moves", path)
         if not listed.value:
@@ -196,7 +206,7 @@ class _Expansion:
             if left:
                 message = f"'{name}' differs from round to round of {left[0]}"
                 raise self._names.refused(message, (*path, "repeat"), f"write it within `repeat: {left[0]}`")
-        return count * self._count(moves, (*path, "moves"), bound | set(names), chain)
+        return count * self._count(moves, (*path, "moves"), bound | set(names), (*chain, ""))
 
     def _rounds(self, over: Node, path: _Path) -> tuple[int, tuple[str, ...]]:
         """Return how many rounds a repeat has, and the names over which it goes."""
@@ -232,9 +242,9 @@ class _Expansion:
                 f"there is no sequence '{name}'", at, hint or "the job has no `sequences`"
             )
         if name in chain:
-            circle = " -> ".join([*chain[chain.index(name) :], name])
+            circle = " -> ".join([*filter(None, chain[chain.index(name) :]), name])
             raise self._names.refused(f"the sequence '{name}' calls itself ({circle})", at)
-        if len(chain) == _LONGEST_CHAIN:
+        if len(chain) - chain.count("") == _LONGEST_CHAIN:
             raise self._names.refused(f"more than {_LONGEST_CHAIN} sequences call one another", at)
         key = (name, bound)
         if key not in self._counted:
@@ -250,8 +260,16 @@ class _Expansion:
                 hint = f"write the move within `- {{repeat: {name}, moves: [...]}}`"
                 raise self._names.refused(message, path, hint)
 
-    def _entries(self, listed: Node, path: _Path, rounds: Rounds, words: str) -> Iterator[_Entry]:
+    def _not_too_deep(self, depth: int, path: _Path) -> None:
+        if depth > _DEEPEST:
+            message = f"more than {_DEEPEST} repeats and calls stand one in another"
+            raise self._names.refused(message, path, "write some of them out")
+
+    def _entries(
+        self, listed: Node, path: _Path, rounds: Rounds, words: str, depth: int = 0
+    ) -> Iterator[_Entry]:
         """Yield the moves that a list stands for, in its rounds."""
+        self._not_too_deep(depth, path)
         items: list[Node] = listed.value  # type: ignore[assignment]
         for index, entry in enumerate(items):
             keys, here = fields_of(entry), (*path, index)
@@ -262,11 +280,12 @@ class _Expansion:
                     now = {**rounds, **dict.fromkeys(names, number)}
                     said = self._names.words(now, names) or f"round {number + 1} of {count}"
                     said = _phrase(words, label, said)
-                    yield from self._entries(keys["moves"], (*here, "moves"), now, said)
+                    yield from self._entries(keys["moves"], (*here, "moves"), now, said, depth + 1)
             elif "call" in keys:
                 name = str(keys["call"].value)
                 at = ("sequences", name)
-                yield from self._entries(self._sequences[name], at, rounds, _phrase(words, label))
+                said = _phrase(words, label)
+                yield from self._entries(self._sequences[name], at, rounds, said, depth + 1)
             else:
                 for part in self._parts.of(entry, here):
                     yield _Entry(self._of_round(part.node, rounds), here, words, part.places)

@@ -24,6 +24,7 @@ _OTHER_TEXTS = ("euler", "configuration", "label", "planner", "signal", "tool")
 
 _OF_MOVES = ("zone", "law", "limits", "at", "duration", "tolerance", "orientation", "approach", "retreat")
 """Keys of moves, which no repeat has."""
+_LONGEST_CHAIN = 100  # points and frames of a round, each given by the next
 _Path = tuple[str | int, ...]
 Rounds = Mapping[str, int]
 """Which of the many a name means, from 0, by name."""
@@ -70,6 +71,7 @@ class ManyNames:
         self._lists: dict[str, list[Node]] = {}
         self._needs: dict[str, tuple[str, ...]] = {}
         self._needs_of: dict[int, tuple[str, ...]] = {}
+        self._in_making: list[str] = []
         self.counts: dict[str, int] = {}
         self.made: dict[str, dict[str, tuple[Node, _Path]]] = {section: {} for section in SECTIONS}
         for section in SECTIONS:
@@ -179,8 +181,13 @@ class ManyNames:
             known += "'"
         made = self.made[self._sections[name]]
         if known not in made:
+            if len(self._in_making) == _LONGEST_CHAIN:
+                message = f"more than {_LONGEST_CHAIN} points and frames are given one by the next"
+                raise self.refused(message, path, "give one of them as a pose of its own")
             made[known] = (node, path)  # before what it names, which may be itself
+            self._in_making.append(known)
             made[known] = (self._of_round(name, node, rounds), path)
+            self._in_making.pop()
         return known
 
     def _of_round(self, name: str, node: Node, rounds: Rounds) -> Node:

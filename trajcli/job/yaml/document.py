@@ -92,6 +92,10 @@ class Document:
         del move
         return ""
 
+    def without_round(self, point: str) -> str:
+        """Return the name of a point as it is written, without the round of a repeat in which it is that."""
+        return point
+
     def plain(self) -> Any:  # noqa: ANN401
         """Return the whole as new dicts, lists and scalars."""
         return self.root.plain()
