@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,16 +17,17 @@ from independent_motion import TOOL, largest, tool_rates
 from random_jobs import loaded
 from tiers import few
 
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.report import Report
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
-from trajcli.limits.kinds import TOOL_KINDS
-from trajcli.limits.tool import ToolFamily, ToolStep, ToolSurvey
+from trajcli.limits.kinds import TOOL_KINDS, LimitedMove
+from trajcli.limits.tool import ToolFamily, ToolStep, ToolSurvey, limits_tool, unjudged
 from trajcli.limits.tool_bound import ToolPeak
 from trajcli.output.report import report_of
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.trajectory import State
+from trajcli.trajectory import Span, State, Trajectory
 
 LEVER, DURATION, TURN = 0.5, 1.6, 1.2
 THIRD = ["jerk", "angular_jerk"]
@@ -244,6 +246,10 @@ def test_a_step_stands_in_the_place_of_the_jerk_of_its_own_kind_alone(turns: boo
     assert set(found) == {f"tool_{key}" for key in uses if key != instead} | {f"tool_{stepping}_jump"}
     step = found[f"tool_{stepping}_jump"]
     assert (step.value, step.limit, step.time) == (3.0, 0.0, 10.75)
+    size, dimension = step.amounts["value"], KIND_OF[stepping].dimension
+    assert (size.value, size.order, size.dimension) == (3.0, 2, dimension)
+    assert step.message.startswith(f"the {KIND_OF[stepping].words} of the tool steps by")
+    assert (step.hint or "").endswith(f"or leave the limit of the tool's {KIND_OF[instead].words} out")
     assert survey.excess() == np.inf
     assert {found[kind].time for kind in found if not kind.endswith("jump")} == {10.25}
 
@@ -254,7 +260,13 @@ def test_each_limit_of_the_tool_is_judged_by_itself(key: str) -> None:
     (finding,) = survey.over(ONE)
     assert (finding.kind, finding.value, finding.limit) == (f"tool_{key}", 2.0, 1.0)
     assert finding.factor == pytest.approx(2.0 ** (1 / (KIND_OF[key].order or 1)))
+    for name, number in (("value", 2.0), ("limit", 1.0)):
+        told = finding.amounts[name]
+        assert (told.value, told.order) == (number, KIND_OF[key].order)
+        assert told.dimension == KIND_OF[key].dimension
     assert survey.excess() == 1.0
+    (unbounded,) = survey_of((), {key: np.inf}).over(ONE)
+    assert (unbounded.value, unbounded.factor) == (np.inf, None)
     (still,) = survey_of((), {key: 2.0}, moves=False).over(ONE)
     assert still.factor is None
     assert [each.kind for each in survey_of((), {key: np.nan}).over(ONE)] == [f"tool_{key}"]
@@ -273,3 +285,71 @@ def test_a_tool_that_is_too_fast_at_an_end_is_so_by_its_speed_or_its_turning(
     arm = replace(ONE, limits=replace(unlimited(1), tcp=ToolLimits(speed=limits[0], angular_speed=limits[1])))
     states = [State(np.zeros(1), np.array([sign * 2.0 * (k == end)]), np.zeros(1)) for k in range(2)]
     assert ToolFamily().over_at_ends(arm, states, ("tool_speed", 0, 1.0)) is over
+
+
+@pytest.mark.parametrize(("share", "over"), [(1 + 3e-6, True), (1 - 1e-9, False)])
+@pytest.mark.parametrize("key", ["speed", "angular_speed"])
+def test_a_tool_is_too_fast_at_the_end_where_its_arm_is_stretched(
+    key: str, share: float, *, over: bool
+) -> None:
+    """Two links of 0.5 m that turn as one: folded they do not move their end, stretched by 1 m for each radian."""
+    pair = (Joint("j1", a=LEVER), Joint("j2", a=LEVER))
+    tcp = ToolLimits(**{key: 2.0 / share})
+    arm = Robot("pair", pair, replace(unlimited(2), tcp=tcp), "standard", np.eye(4), np.eye(4))
+    turning, still = np.array([2.0, 0.0]), np.zeros(2)
+    folded, stretched = (State(np.array([0.3, elbow]), turning, still) for elbow in (np.pi, 0.0))
+    for ends in ([folded, stretched], [stretched, folded]):
+        assert ToolFamily().over_at_ends(arm, ends, ("tool_speed", 0, 1.0)) is over
+    assert ToolFamily().over_at_ends(arm, [folded] * 2, ("tool_speed", 0, 1.0)) is (over and key != "speed")
+
+
+def test_limits_of_the_tool_that_nobody_can_judge_are_those_that_are_stated() -> None:
+    stated = replace(unlimited(1), tcp=ToolLimits(speed=1.0, angular_jerk=2.0))
+    blind = replace(ONE, convention=None)
+    assert unjudged(stated, None) == unjudged(stated, blind) == {"speed", "angular_jerk"}
+    assert unjudged(stated, ONE) == unjudged(unlimited(1), None) == set()
+    assert limits_tool(replace(ONE, limits=stated))
+    assert not limits_tool(ONE)
+    assert not limits_tool(replace(blind, limits=stated))
+
+
+@pytest.mark.parametrize("key", ["speed", "acceleration", "jerk", "angular_jerk"])
+@pytest.mark.parametrize("move", [0, 1])
+def test_a_move_is_surveyed_with_times_from_its_own_start(move: int, key: str) -> None:
+    """Two moves that rest but for a short pulse of angle each, 0.25 s behind the start of the first, 0.5 of the second."""
+    pulse = np.polyint(np.poly([0.0, 0.0, 0.25, 0.25]))
+    rows = np.zeros((6, 4, 1))
+    rows[:, 1, 0], rows[:, 3, 0] = 40.0 * pulse, 40.0 * pulse
+    gone = float(np.polyval(40.0 * pulse, 0.25))
+    rows[-1, 2:, 0], rows[-1, 3, 0] = gone, gone
+    curve = PiecewisePolynomial(np.array([0.0, 0.25, 0.5, 1.0, 1.25]), rows)
+    spans = (Span(0, "quintic", 0.0, 0.5, 2), Span(1, "quintic", 0.5, 1.25, 2))
+    start, end = (State(np.array([q]), np.zeros(1), np.zeros(1)) for q in (0.0, 2 * gone))
+    whole = Trajectory(curve, ("j1",), ("revolute",), spans, start, end)
+    arm = replace(ONE, limits=replace(unlimited(1), tcp=ToolLimits(**{key: 1e-9})))
+    survey = ToolFamily().survey(LimitedMove(whole, spans[move], arm.limits, arm))
+    assert survey is not None
+    assert survey.begins == spans[move].start
+    quiet = (0.25, 0.5)[move]  # until the pulse begins
+    assert quiet < survey.peaks[key].time < quiet + 0.25 or key.endswith("jerk")
+    assert all(spans[move].start + quiet <= each.time <= spans[move].end for each in survey.over(whole))
+    assert {each.kind for each in survey.over(whole)} == {f"tool_{key}"}
+    assert (survey.moves, survey.on_path) == (True, False)
+
+
+@pytest.mark.parametrize("ends", [1.0, 0.0])
+@pytest.mark.parametrize("limited", [True, False])
+@pytest.mark.parametrize("along", [True, False])
+def test_the_tool_is_surveyed_where_it_has_limits_or_a_path(along: bool, limited: bool, ends: float) -> None:
+    """A joint that turns at 2 rad/s for a second, or for no time at all."""
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([2.0, 0.0])[:, None, None])
+    span = Span(0, "quintic", 0.0, ends, 2)
+    whole = Trajectory(curve, ("j1",), ("revolute",), (span,), *[State(*np.zeros((3, 1)))] * 2)
+    arm = replace(ONE, limits=replace(unlimited(1), tcp=ToolLimits(speed=0.25))) if limited else ONE
+    motion = SimpleNamespace() if along else None
+    survey = ToolFamily().survey(LimitedMove(whole, span, arm.limits, arm, motion))  # type: ignore[arg-type]
+    assert (survey is not None) == (limited or along)
+    if survey is not None:
+        assert (survey.on_path, survey.moves, bool(survey.peaks)) == (along, ends > 0, limited)
+        assert [each.value for each in survey.over(whole)] == [pytest.approx(1.0)] * (limited and ends > 0)
+    assert ToolFamily().survey(LimitedMove(whole, span, arm.limits, None, motion)) is None  # type: ignore[arg-type]
