@@ -353,3 +353,22 @@ def test_the_tool_is_surveyed_where_it_has_limits_or_a_path(along: bool, limited
         assert (survey.on_path, survey.moves, bool(survey.peaks)) == (along, ends > 0, limited)
         assert [each.value for each in survey.over(whole)] == [pytest.approx(1.0)] * (limited and ends > 0)
     assert ToolFamily().survey(LimitedMove(whole, span, arm.limits, None, motion)) is None  # type: ignore[arg-type]
+
+
+def test_a_step_has_its_time_from_the_start_of_the_move() -> None:
+    """Of two moves the second rests for half a second, and gains 1 rad/s^2 at once for a quarter."""
+    rows = np.zeros((3, 3, 1))
+    rows[0, 2] = 0.5
+    curve = PiecewisePolynomial(np.array([0.0, 1.0, 1.5, 1.75]), rows)
+    spans = (Span(0, "quintic", 0.0, 1.0, 2), Span(1, "quintic", 1.0, 1.75, 2))
+    end = State(*(curve.piece_ends(order)[1][-1] for order in range(3)))
+    start = State(*np.zeros((3, 1)))
+    whole = Trajectory(curve, ("j1",), ("revolute",), spans, start, end)
+    arm = replace(ONE, limits=replace(unlimited(1), tcp=ToolLimits(jerk=99.0)))
+    survey = ToolFamily().survey(LimitedMove(whole, spans[1], arm.limits, arm))
+    assert survey is not None
+    assert [(step.kind.key, step.size, step.time) for step in survey.steps] == [
+        ("acceleration", pytest.approx(LEVER), 0.5)
+    ]
+    (found,) = survey.over(whole)
+    assert (found.kind, found.time) == ("tool_acceleration_jump", 1.5)
