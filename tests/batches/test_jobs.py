@@ -75,6 +75,7 @@ def test_goals_that_a_batch_has_written_are_no_jobs() -> None:
         (["jobs/b.yaml", "twin/b.yaml"], "out", "csv", "jobs/b.yaml and twin/b.yaml would both be written to out/b.csv"),
         (["jobs/b.yaml", "jobs/b.yaml"], None, "csv", "would both be written to jobs/b.csv"),
         (["jobs/b.yaml", "./jobs/../jobs/b.yaml"], None, "csv", "would both be written to"),
+        ([""], None, "csv", "the name of a job is empty"),
         (["jobs/b.yaml"], None, "ros", "the rows of jobs/b.yaml would overwrite jobs/b.yaml"),
         (["jobs/deep/a.yaml", "twin/b.yaml"], "jobs/deep", "ros-goal", "would overwrite jobs/deep/a.yaml"),
         (["none"], "out", "csv", "there is no job in none"),

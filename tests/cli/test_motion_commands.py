@@ -187,6 +187,8 @@ WRONG = [
     (("slice", "rows.csv", "--from", "0.5", "--to", "0.5"), 2, "is not before"),
     (("concat", "rows.csv"), 2, "concat joins two files at least"),
     (("concat", "rows.csv", "pick.csv"), 2, "has 1 joint"),
+    (("retime", "-", "--job", "-"), 2, "standard input can be read once"),
+    (("plan", "-", "-", "--no-output"), 2, "standard input can be read once"),
     (("reverse", "none.csv"), 4, "none.csv"),
     (("reverse", "job.yaml"), 2, "job.yaml"),
     (("reverse", "rows.csv", "-o", "rows.csv"), 2, "-o to rows.csv would overwrite the rows of rows.csv"),

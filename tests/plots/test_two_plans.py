@@ -57,6 +57,13 @@ def test_the_difference_is_second_minus_first() -> None:
     assert panel.y_label == "\u0394q [deg]"
 
 
+def test_plans_of_one_name_are_called_by_their_files() -> None:
+    one, other = (plan_job(job_from_text(ARM % ("cubic", 2, 0), f"{folder}/x.yaml")) for folder in "AB")
+    picture = picture_of(one, quantities=["q"], second=other)
+    assert picture.sources == ("A/x.yaml", "B/x.yaml")
+    assert picture.title == "A/x.yaml: verified, 2 s; B/x.yaml: verified, 2 s"
+
+
 def test_each_plan_has_its_verdict() -> None:
     picture = picture_of(planned("quintic", 2), quantities=["q"], second=planned("cubic", 0.5))
     assert picture.title.startswith("quintic: verified, 2 s; cubic: NOT VERIFIED, ")

@@ -68,6 +68,8 @@ def find_jobs(names: Sequence[str], folder: str | None, form: FormatName) -> Bat
     for name in names:
         if name == "-":
             raise InputError("a batch reads no standard input", hint="name files or folders")
+        if not name:
+            raise InputError("the name of a job is empty", hint="name files or folders; . is the current one")
         if not is_folder(name):
             jobs.append(BatchJob(name, _output(Path(name), Path(Path(name).name), folder, ending)))
             continue

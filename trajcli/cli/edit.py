@@ -121,6 +121,8 @@ def run_retime(options: RetimeCommand) -> int:
     from trajcli.streams.reading import refuse_job
 
     arm = [name for name in (options.job, options.robot) if name is not None]
+    if [options.file, *arm].count("-") > 1:
+        raise InputError("standard input can be read once")
     _check_output([options.file], options, (file for name in arm for file in files_of_arm(name)))
     if not arm:
         refuse_job(ByteSource(options.file))

@@ -25,6 +25,8 @@ def run_plan(options: PlanCommand) -> int:
         InputError: When several jobs would be written.
     """
     jobs, form = [options.job, *options.others], options.errors
+    if jobs.count("-") > 1:
+        raise InputError("standard input can be read once")
     if len(jobs) > 1:
         _check_nothing_is_written(options)
     if form == "text" or form == "json":

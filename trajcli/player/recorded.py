@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trajcli.columns import EFFORT, Column, parse_column
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError, Place, Problem, utf8
+from trajcli.errors import InputError, utf8
 from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile
 from trajcli.kinematics.robot import JointType, Robot
@@ -146,9 +146,8 @@ def _times(table: Table) -> Array:
     wrong = np.flatnonzero(np.diff(times) <= 0)
     if len(wrong):
         row = int(wrong[0]) + 1
-        place = Place(table.file, row + 2, 1, "")
-        text = f"the time {times[row]:.12g} s follows {times[row - 1]:.12g} s, expected times that increase"
-        raise InputError(Problem(text, f"row {row + 1} of the file", place))
+        after = f"the time {times[row]:.12g} s follows {times[row - 1]:.12g} s"
+        raise InputError(f"{table.file}, row {row} (from 0): {after}, expected times that increase")
     return times
 
 

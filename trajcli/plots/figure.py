@@ -168,7 +168,7 @@ def _draw_panel(frame: PanelFrame, panel: Panel, note: str, *, numbered: bool) -
     for trace in panel.traces:
         frame.plot(trace.x, trace.y, f"source{trace.source}", **style_of(trace.source))
     _draw_marks(frame, panel)
-    x_ticks, x_names = ticks_of(frame.x, _X_TICKS)
+    x_ticks, x_names = _ticks_with_room(frame)
     y_ticks, y_names = ticks_of(frame.y, _Y_TICKS)
     frame.outline(x_ticks, y_ticks)
     frame.y_axis(y_ticks, y_names, panel.y_label)
@@ -176,6 +176,15 @@ def _draw_panel(frame: PanelFrame, panel: Panel, note: str, *, numbered: bool) -
         frame.x_axis(x_ticks, x_names, panel.x_label)
     room = 0.95 * (frame.width - text_width(note, SMALL)) - 0.15
     frame.titles(shortened(panel.title, NORMAL, room), note, LIMIT_COLOUR)
+
+
+def _ticks_with_room(frame: PanelFrame) -> tuple[list[float], list[str]]:
+    """Return ticks at x, fewer where their numbers are long, such as times since 1970."""
+    for most in range(_X_TICKS, 0, -1):
+        ticks, names = ticks_of(frame.x, most)
+        if sum(text_width(name, SMALL) for name in names) <= frame.width:
+            break
+    return ticks, names
 
 
 def _draw_marks(frame: PanelFrame, panel: Panel) -> None:

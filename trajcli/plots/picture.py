@@ -25,7 +25,7 @@ from trajcli.plots.choice import (
 )
 from trajcli.plots.display_units import DisplayUnits, require_joints, units_of_files
 from trajcli.plots.panel import NO_POINTS, Panel, PanelBlock, PathViews, Picture, Trace
-from trajcli.plots.planned_motion import PlannedMotion, difference_block, rows_of_plan
+from trajcli.plots.planned_motion import PlannedMotion, difference_block, names_of_plans, rows_of_plan
 from trajcli.plots.sampling import thinned
 from trajcli.queries.arm import frame_of_rows
 from trajcli.streams.table import Table
@@ -70,6 +70,7 @@ def picture_of(
     if motion is not None and second is not None:
         tables = [rows_of_plan(second, motion.offset), *tables]
         judgements = [None, *judgements] if judgements else ()
+    plans = [each for each in (plan, second) if each is not None]
     of_plans = int(second is not None)
     records = _records(motion, tables, judgements, of_plans) if tables else []
     display = records[0].display if motion is None else motion.display
@@ -88,10 +89,8 @@ def picture_of(
     if PHASE in drawn and motion is not None:
         blocks.append(_phase_block(motion))
     return Picture(
-        _title(motion, records, second),
-        tuple(
-            ([] if plan is None else [plan.loaded.name]) + _names([record.table.file for record in records])
-        ),
+        _title(plans, records[of_plans:]),
+        (*names_of_plans(plans), *_names([record.table.file for record in records[of_plans:]])),
         tuple(blocks),
         maker.views() if PATH in drawn else None,
         None if motion is None else motion.borders,
@@ -160,11 +159,11 @@ def _impossible(motion: PlannedMotion | None, records: Sequence[DrawnTable]) -> 
     return {name: text for name, text in needs.items() if name not in shown}
 
 
-def _title(motion: PlannedMotion | None, records: Sequence[DrawnTable], second: Plan | None) -> str:
-    if motion is None:
+def _title(plans: Sequence[Plan], records: Sequence[DrawnTable]) -> str:
+    if not plans:
         more = len(records) - 1
         return records[0].table.file + (f" and {more} more file{'s' * (more > 1)}" if more else "")
-    title = "; ".join(_verdict(plan) for plan in (motion.plan, second) if plan is not None)
+    title = "; ".join(map(_verdict, plans, names_of_plans(plans)))
     for name, record in zip(_names([record.table.file for record in records]), records, strict=True):
         if record.judgement is not None and not record.judgement.passed:
             errors = len(record.judgement.errors)
@@ -172,14 +171,14 @@ def _title(motion: PlannedMotion | None, records: Sequence[DrawnTable], second: 
     return title
 
 
-def _verdict(plan: Plan) -> str:
+def _verdict(plan: Plan, name: str) -> str:
     verdict = "verified"
     if not plan.verdict.passed:
         from trajcli.planning.causes import causes_of
 
         count = len(causes_of(plan))
         verdict = f"NOT VERIFIED, {count} finding{'s' * (count != 1)}"
-    return f"{plan.loaded.name}: {verdict}, {plan.trajectory.duration:.6g} s"
+    return f"{name}: {verdict}, {plan.trajectory.duration:.6g} s"
 
 
 def _names(files: Sequence[str]) -> list[str]:

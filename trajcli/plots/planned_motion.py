@@ -328,6 +328,12 @@ def _passed(move: PlannedMove) -> ViaPoints | None:
     return ViaPoints(np.array([move.duration]), end[None], np.zeros((1, end.size)))
 
 
+def names_of_plans(plans: Sequence[Plan]) -> list[str]:
+    """Return how a picture calls plans: by their jobs, with the folders where these have one name."""
+    names = [plan.loaded.name for plan in plans]
+    return names if len(set(names)) == len(names) else [plan.loaded.document.file for plan in plans]
+
+
 def rows_of_plan(plan: Plan, start: float) -> Table:
     """Return a plan as a table of rows, SI, with both sides of each of its breaks.
 
@@ -379,7 +385,7 @@ def difference_block(motion: PlannedMotion, second: Plan, joints: Sequence[int])
     curves = motion.plan.trajectory.curve, second.trajectory.curve
     counts = [curve.dimension for curve in curves]
     if counts[0] != counts[1]:
-        names = motion.plan.loaded.name, second.loaded.name
+        names = names_of_plans((motion.plan, second))
         text = f"the jobs have not as many joints: {names[0]} has {counts[0]}, {names[1]} has {counts[1]}"
         raise InputError(text, hint="plot each alone")
     times = []

@@ -202,9 +202,11 @@ def motion_files(name: str) -> list[str]:
     """Return the files of motions below a folder by name, but no hidden ones; of a file its own name.
 
     Raises:
-        InputError: When a folder holds none.
+        InputError: When a folder holds none, or the name is empty.
         FileError: When it cannot be read.
     """
+    if not name:
+        raise InputError("the name of a file is empty", hint="name files or folders; . is the current one")
     if not is_folder(name):
         return [name]
     paths = [path for path in paths_below(name, "[!.]*") if kind_of(path) == "file"]
