@@ -109,6 +109,18 @@ def test_a_message_has_the_rows_as_points(form: str, capfd: Capture) -> None:
     assert (code, "columns number the joints: j1" in err) == (0, True)
 
 
+def test_a_message_about_other_joints_is_checked_by_its_numbers(capfd: Capture) -> None:
+    """As the hint says: converted, it has no names that contradict those of the robot."""
+    robot = "{joints: [{name: a, velocity: 2}, {name: b, velocity: 2}]}"
+    Path("arm.yaml").write_text(robot)
+    points = [f"- {{positions: [0.{k}, 0.5], time_from_start: {{sec: {k}}}}}\n" for k in (0, 1)]
+    Path("goal.yaml").write_text(f"joint_names: [x, y]\npoints:\n{''.join(points)}")
+    found = call(capfd, "check", "goal.yaml", "--robot", "arm.yaml")
+    assert (found.code, "trajcli convert" in found.err) == (2, True)
+    assert call(capfd, "convert", "goal.yaml", "-o", "back.csv").code == 0
+    assert call(capfd, "check", "back.csv", "--robot", "arm.yaml").code == 0
+
+
 def test_a_stranger_keeps_names_order_and_units(capfd: Capture) -> None:
     text = "Time;q2_deg;q1_mm\n0.000;10.00;1.5\n0.250;20.50;2.5\n0.500;30.00;3.0\n"
     Path("log.csv").write_text(text)

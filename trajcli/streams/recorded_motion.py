@@ -79,8 +79,7 @@ class RecordedMotion:
         resolution: Of the whole file.
         source: Name of the file, for messages.
         first_row: Number of the first of these rows, from 1, a line of names not counted.
-        message_joints: Names of all joints of a ROS message, also of those that are left out; None elsewhere,
-            and where these are not taken by their names.
+        message_joints: Names of all joints of a ROS message, also of those that are left out; None elsewhere.
     """
 
     t: Array
@@ -164,8 +163,7 @@ class MotionFile:
         }
         self.quantities = (*roles.joints, *((MOVE,) if self._move is not None else ()))
         self.unread = roles.rest
-        known = rows.format == "ros" and {*(names or ())} & {*(rows.joint_names or ())}
-        self._message_joints = rows.joint_names if known else None
+        self._message_joints = rows.joint_names if rows.format == "ros" else None
         self.notes = (*rows.notes, *note_of_unread(roles.rest), *scales.notes)
         self._kept: list[Array] | None = []
         self._read_all(scales)

@@ -411,11 +411,14 @@ def ordered_joints(
     everything = list(range(count))
     if wanted is None:
         return everything, None if names is None else tuple(names), ()
-    if names is not None and set(wanted) & set(names):
+    of_message = names is not None and roles.joint_names is None
+    if names is not None and (of_message or set(wanted) & set(names)):
         missing = [name for name in wanted if name not in names]
         if missing:
             hint = did_you_mean(missing[0], names) or valid_names(names, "its joints are")
-            raise file.wrong(f"there is no joint '{missing[0]}'", hint)
+            none = of_message and len(missing) == len(wanted)
+            more = "; rows that `trajcli convert` makes of it number them in this order" if none else ""
+            raise file.wrong(f"there is no joint '{missing[0]}'", f"{hint}{more}")
         rest = [name for name in names if name not in wanted]
         notes = (f"joints that are not of the robot: {', '.join(rest)}",) if rest else ()
         return [list(names).index(name) for name in wanted], tuple(wanted), notes
