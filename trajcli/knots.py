@@ -324,11 +324,7 @@ def _missed(
 def _difference(
     curve: PiecewisePolynomial, whole: Nanoseconds, times: Array, states: Array
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Return control points of what polynomials miss in w parts of intervals that follow each other.
-
-    Returns:
-        Of positions and velocities, (degree + 1, 2, n, w), and to which interval each part belongs, (w,).
-    """
+    """Return control points of what polynomials miss in w parts of intervals that follow each other."""
     between = slice(*np.searchsorted(curve.breaks, times[[0, -1]]).tolist())
     united = distinct(np.concatenate([times, curve.breaks[between]]))
     starts, lengths = united[:-1], np.diff(united)

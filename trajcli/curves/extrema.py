@@ -246,12 +246,7 @@ def _normalised(coefficients: Array, lengths: Array) -> Array:
 
 
 def _chain(coefficients: Array, lowest: int) -> dict[int, Array]:
-    """Return for each j points (degree - j, w, n) in [0, 1], ascending: all roots of derivative j and more.
-
-    Args:
-        coefficients: Shape (degree + 1, w, n).
-        lowest: The smallest j that is asked for.
-    """
+    """Return for each j points (degree - j, w, n) in [0, 1], ascending: roots of derivative j and more."""
     degree = coefficients.shape[0] - 1
     roots: dict[int, Array] = {}
     for order in range(degree - 1, lowest - 1, -1):
@@ -389,12 +384,7 @@ def _windows(curve: PiecewisePolynomial, intervals: Array) -> _Windows:
 def _surveyed(
     curve: PiecewisePolynomial, windows: _Windows, orders: Sequence[int]
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Return what stands at both ends of all parts, and where a peak may lie between them.
-
-    Returns:
-        Values of each order, shape (orders, 2, w, n), and whether control points leave room for more than
-        stands at any end, shape (w, n).
-    """
+    """Return what stands at both ends of all parts, and where a peak may lie between them."""
     shape = (2, windows.piece.size, curve.dimension)
     ends, worth = np.empty((len(orders), *shape)), np.full(shape[1:], windows.piece.size < _MANY)
     few = bool(worth.all())

@@ -85,11 +85,7 @@ class PhaseChain:
         return _Seen(states, leftover, tuple(peaks), duration, [size or 1.0 for size in sizes], missed)
 
     def _walk(self) -> _Walk:
-        """Return the states before each phase and at the end, and what is seen at cruises and beside them.
-
-        Returns:
-            The states; what cruises had instead of 0; the durations of the other phases.
-        """
+        """Return the states before each phase and at the end, and what is seen at cruises and beside them."""
         state = [*self.initial]
         rows, leftover, driving = [], [], []
         for k, (time, constant) in enumerate(zip(self.durations, self.constants, strict=True)):

@@ -125,12 +125,7 @@ def _first_of_each(problems: Sequence[Problem]) -> list[Problem]:
 def _entries(
     path: str, robot: Robot, units: Units, read: Callable[[Any, Document, int, ReadingContext], V]
 ) -> tuple[Document, list[V]]:
-    """Return what each entry of a list is read as.
-
-    Raises:
-        InputError: With the flaws of all.
-        FileError: When the file cannot be read.
-    """
+    """Return what each entry of a list is read as."""
     document = read_document(path, any_root=True)
     content = document.root.value
     if not isinstance(content, list) or not content:

@@ -328,11 +328,7 @@ def moves_by_time(
 
 
 def _given(options: CheckOptions) -> _Given:
-    """Return what the job, or the robot and the limits say.
-
-    Raises:
-        InputError: When neither is named, or both are.
-    """
+    """Return what the job, or the robot and the limits say."""
     if options.job is not None:
         if options.robot is not None or options.limits is not None:
             other = "--robot" if options.robot is not None else "--limits"
@@ -396,11 +392,7 @@ def _shown_units(options: CheckOptions, given: _Given) -> Units:
 
 
 def _carrying(given: _Given, options: CheckOptions) -> _Given:
-    """Return the same with what the tool carries; the efforts that the arm states are then its limits.
-
-    Raises:
-        InputError: When a job says what is carried, the arm has no inertias, or the payload is none.
-    """
+    """Return the same with what the tool carries; the efforts that the arm states are then its limits."""
     if options.payload is None:
         return given
     if given.loaded is not None:
@@ -446,11 +438,7 @@ def _requirements(
 
 
 def _arms_of(loaded: LoadedJob) -> dict[int, Robot]:
-    """Return the arm of each move of a job that has no plan, with the limits in force and what it carries.
-
-    Raises:
-        InputError: When a limit of a move is looser than the job's.
-    """
+    """Return the arm of each move of a job that has no plan, with the limits in force and what it carries."""
     from trajcli.job.limits import with_move_limits
 
     arms, robot = {}, loaded.robot

@@ -214,11 +214,6 @@ class RecordedPath:
         """Return of samples that are as near those beside places where the tool is on the path, if any is.
 
         Where a path comes back to a place, or goes to and fro, the orientation tells when it is there.
-
-        Args:
-            near: Their indices, increasing; neighbours are beside one place.
-            square: Squared distances from all samples.
-            pose: Of the tool, shape (4, 4).
         """
         groups = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
         if len(groups) == 1:
@@ -229,13 +224,7 @@ class RecordedPath:
         return np.concatenate([groups[k] for k in np.flatnonzero(off <= max(1.0, off.min()))])
 
     def _refined(self, s: Array, poses: Array, within: tuple[Array, Array] | None = None) -> Array:
-        """Return the values of s (N,) at which the path is nearest to the tool, from values beside them.
-
-        Args:
-            s: Shape (N,).
-            poses: Of the tool, shape (N, 4, 4).
-            within: Between which values each s stays, as on one side of a corner; None for the whole path.
-        """
+        """Return the values of s (N,) at which the path is nearest to the tool, from values beside them."""
         turning, step = self._path.poses.pure_rotation, self._path.length / _SAMPLES
         low, high = (0.0, self._path.length) if within is None else within
         if within is not None:

@@ -118,13 +118,7 @@ def _base(point: Array, axis: Array, *, slides: bool) -> Array:
 
 
 def _row(point: Array, axis: Array, *, slides: bool) -> tuple[float, float, float, float, float]:
-    """Return the row to the next axis: a line, or only a direction where that joint slides.
-
-    Args:
-        point: On the axis, in the frame of the joint before, which moves about or along z.
-        axis: Unit vector.
-        slides: Whether the next joint slides.
-    """
+    """Return the row to the next axis: a line, or only a direction where that joint slides."""
     (px, py, pz), (ux, uy, uz) = map(float, point), map(float, axis)
     sine = hypot(ux, uy)
     if sine <= PARALLEL:

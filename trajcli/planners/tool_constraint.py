@@ -255,14 +255,7 @@ def _across(along: Array, curvature: Array) -> Array:
 def _translation_rows(
     tangent: Array, along: Array, curvature: Array, limit: float
 ) -> tuple[Array, Array, Array]:
-    """Return a, b and c of rows a sdd + b sd^2 <= c, each (N, k), of the acceleration of the tcp.
-
-    Args:
-        tangent: Size of p', (N,).
-        along: Part of p'' along p', (N,); zero where s is the arc length.
-        curvature: Size of p'', (N,).
-        limit: Of the acceleration.
-    """
+    """Return a, b and c of rows a sdd + b sd^2 <= c, each (N, k), of the acceleration of the tcp."""
     count = tangent.size
     if not curvature.any():
         ones = np.ones((count, 1)) * tangent[:, None]

@@ -180,14 +180,7 @@ def _improved(problem: _Problem, point: _Point, weight: float) -> _Point | None:
 
 
 def _eased(family: CurveFamily, durations: Array, bounds: Array, width: int) -> Array:
-    """Return the durations made longer around those pieces that exceed a limit, again and again.
-
-    Args:
-        family: The curve from 0 whose pieces last as long as asked.
-        durations: Positive, shape (m,).
-        bounds: Shape (3, n, 2).
-        width: How many pieces to either side follow, as much at first, and then less and less.
-    """
+    """Return the durations made longer around those pieces that exceed a limit, again and again."""
     orders = np.repeat(np.array(_orders(bounds), dtype=np.float64), bounds.shape[1])
     best, least = durations, np.inf
     for _ in range(_EASINGS):
@@ -259,12 +252,7 @@ def _scattered(values: Array, size: int) -> Array:
 
 
 def _blocks(curvature: Array, diagonal: Array) -> tuple[Array, Array]:
-    """Return the diagonal blocks (b, band, band) and those to their right (b - 1, band, band) of the Hessian.
-
-    Args:
-        curvature: Shape (m, window, window).
-        diagonal: What is added to the diagonal, shape (m,).
-    """
+    """Return the diagonal blocks (b, band, band) of the Hessian and those to their right (b - 1, ...)."""
     m = diagonal.size
     count = -(-m // _BAND)
     band = np.zeros((_BAND + 1, m + 2 * _NEAR))

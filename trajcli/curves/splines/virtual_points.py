@@ -182,11 +182,7 @@ def _many_pieces(points: Waypoints, virtual: Array, first: _EndState, last: _End
 def _solve(
     acceleration: Array, points: Waypoints, virtual: Array, first: _EndState, last: _EndState
 ) -> tuple[Array, Array]:
-    """Write the accelerations at the inner waypoints but the last one, (m - 3, n).
-
-    Returns:
-        Those at the first and the last of them, (2, n), and the velocity that leaves the last one, (n,).
-    """
+    """Write the accelerations at the inner waypoints but the last one, (m - 3, n)."""
     beside, leaving = np.empty((2, points.positions.shape[1])), np.empty(points.positions.shape[1])
     for columns in solved_together(*points.positions.shape):
         part = Waypoints(points.times, points.positions[:, columns])

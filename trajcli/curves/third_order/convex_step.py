@@ -103,13 +103,7 @@ def _over_interval(
 def _second_order(
     sample: Sample, constraint: PathConstraint, lowered: Array
 ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Return the row of the cap and the others, each with what b = 1 leaves.
-
-    Args:
-        sample: The law at a share of its intervals.
-        constraint: Of velocity and acceleration.
-        lowered: By what its limits are divided, shape (3, N).
-    """
+    """Return the row of the cap and the others, each with what b = 1 leaves."""
     s, v, a, _ = sample.state
     given = constraint.rows(s, sample.side)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -208,15 +208,7 @@ def _at_constant_speed(
     free: NDArray[np.bool_],
     end: int,
 ) -> tuple[Array, Array, Array, NDArray[np.intp]]:
-    """Return rows by which intervals with an unbounded end are passed without sdd.
-
-    Args:
-        rows: P, R, C and of which row each is made.
-        other: a, b and c at the other ends, each of shape (k, N).
-        D: Lengths, shape (N,).
-        free: Which intervals these are, shape (N,).
-        end: At which of their ends.
-    """
+    """Return rows by which intervals with an unbounded end are passed without sdd."""
     P, R, C, sources = rows
     held, none = 2.0 * D * other[1][sources], np.zeros_like(P)
     P, R = (np.where(free, each, was) for each, was in zip((none, held)[:: 1 - 2 * end], (P, R), strict=True))

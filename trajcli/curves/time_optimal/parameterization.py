@@ -322,11 +322,7 @@ def _excess(problem: PathProblem, pieces: LawPieces, before: GridSolution | None
 
 
 def _solution_on_grid(problem: PathProblem, grid: Array, before: GridSolution | None) -> GridSolution:
-    """Return the solution on a grid (N + 1,); one on another grid spares some work.
-
-    Raises:
-        StandstillError: When it stands still from one grid point to the next.
-    """
+    """Return the solution on a grid (N + 1,); one on another grid spares some work."""
     rows = interval_rows(grid, problem.constraints, problem.stops)
     speeds = solve(rows, *problem.ends)
     still = np.flatnonzero(np.maximum(speeds.x[1:], speeds.x[:-1]) <= 0.0)

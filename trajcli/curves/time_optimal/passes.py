@@ -365,12 +365,7 @@ def _one_by_one(slopes: Array, offsets: Array, limits: Array, z: float) -> list[
 
 
 def _lowest_lines(first: Array, last: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return for each row of lines which is lowest at first, and which others may be lowest somewhere.
-
-    Args:
-        first: Their values where z is zero, shape (N, m).
-        last: Their values where z is as large as it may be, shape (N, m).
-    """
+    """Return for each row of lines which is lowest at first, and which others may be lowest somewhere."""
     rows = np.arange(len(first))
     main, other = first.argmin(axis=1), last.argmin(axis=1)
     further: NDArray[np.bool_] = (first < first[rows, other][:, None]) & (last < last[rows, main][:, None])

@@ -219,9 +219,6 @@ def _of_twists(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array
     """Return the joints by integration of their velocities from a start, by the method of Runge and Kutta.
 
     Between two rows the velocity of the tool changes linearly, or as its derivative says at both.
-
-    Raises:
-        InputError: When the tool changes: a step of its velocity between two rows is then none of the joints.
     """
     if moves is not None:
         raise InputError(

@@ -194,11 +194,6 @@ def _wave_majorant(shape: WaveShape, phase: Array, rising: Array) -> Array:
     """Return bounds of |w^(m)| / m! by time (order + 1, P), on pieces with these phases (P,), in cycles.
 
     The wave is exp(i f), or a polynomial of the phase f, of what the phase rises by.
-
-    Args:
-        shape: Of the wave.
-        phase: Within each piece, none of which passes a break of the wave, shape (P,).
-        rising: Bounds of |f^(m)| / m!, shape (order + 1, P).
     """
     rising = np.concatenate([np.zeros((1, rising.shape[1])), rising[1:]])
     if shape == "sine":

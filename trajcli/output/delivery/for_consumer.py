@@ -386,14 +386,7 @@ class _Search:
     def _tightened(
         self, loaded: LoadedJob, adapted: Adaptation, longest: float, *, stretched: bool = False
     ) -> ForConsumer | None:
-        """Return a motion whose rows keep all, within tighter limits where that is needed.
-
-        Args:
-            loaded: The job.
-            adapted: How its moves are planned.
-            longest: One that lasts longer is of no use, s.
-            stretched: Whether moves are stretched only.
-        """
+        """Return a motion whose rows keep all, within tighter limits where that is needed."""
         from trajcli.output.delivery.tightening import tightened
 
         for count in range(_ROUNDS):

@@ -366,13 +366,7 @@ class JoinedRows:
         )
 
     def _rows(self, times: Array, index: NDArray[np.int64], stated: int) -> Array:
-        """Return states and moves of some rows, SI, shape (N, stated n + 1).
-
-        Args:
-            times: Of these rows, from the start, s, shape (N,).
-            index: Which they are, shape (N,).
-            stated: How many of position, velocity and acceleration.
-        """
+        """Return states and moves of some rows, SI, shape (N, stated n + 1)."""
         plan, grid = self.plan, self.grid
         part: Grid = ListedGrid(plan.trajectory.duration, times)
         if isinstance(grid, KnotGrid):

@@ -143,15 +143,7 @@ def _step(
 def _fill_state_rows(
     problem: WaypointProblem, motion: StateMotion, region: float, rows: Array, bounds: tuple[Array, Array]
 ) -> None:
-    """Write the rows of the states at the points after each segment: trust region and limits.
-
-    Args:
-        problem: Points and limits.
-        motion: Where the states are.
-        region: By what part of its scale a state may change.
-        rows: Shape (K, n, R, 5), written to.
-        bounds: Lower and upper, each of shape (K, n, R), written to.
-    """
+    """Write the rows of the states at the points after each segment: trust region and limits."""
     scales, after, states = problem.scales, ~problem.fixed[1:], motion.states[1:]
     low, high = bounds
     for k, limits in enumerate((problem.velocity, problem.acceleration)):

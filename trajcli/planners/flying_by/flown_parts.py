@@ -126,11 +126,7 @@ def _law_between(
 def _within_tightest(
     course: Course, index: int, stretch: tuple[float, float], states: Array, tempo: float
 ) -> tuple[FlownPart | None, bool]:
-    """Return the fastest motion along a straight line within the tightest bounds of its law.
-
-    Returns:
-        The motion, None where it does not keep all limits; whether looser bounds would gain next to nothing.
-    """
+    """Return the fastest motion along a straight line within the tightest bounds of its law."""
     if not course.straight:
         return None, False
     rates = course.rates(np.linspace(*stretch, _SAMPLES))

@@ -133,12 +133,7 @@ class MotionSearch:
         return best
 
     def _flown(self, row: ChainRow, found: FoundStates) -> tuple[FoundStates, list[FlownPart]]:
-        """Return the parts of a motion, and its states: those at borders near which laws fail are calmed.
-
-        Raises:
-            NoLawError: With the states that were found, when that is no help.
-            PlanningError: When some zone has no motion.
-        """
+        """Return the parts of a motion, and its states: those at borders near which laws fail are calmed."""
         known, failed = self._stopping.parts(self.chain), list[NoLawError]()
         longest = _LONGER * found.duration
         while True:

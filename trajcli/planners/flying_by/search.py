@@ -140,13 +140,7 @@ class ChainSearch:
 
 
 def _windows(parts: int, moves: int, overlap: int = 1) -> list[tuple[int, int]]:
-    """Return the first and the last node of each window of a chain: paths and zones in turns.
-
-    Args:
-        parts: How many parts the chain has.
-        moves: How many moves a window has.
-        overlap: How many of its last moves are the first of the next one.
-    """
+    """Return the first and the last node of each window of a chain: paths and zones in turns."""
     windows = [(0, min(parts, 2 * moves - 1))]
     while windows[-1][1] < parts:
         low = windows[-1][1] + 1 - 2 * overlap

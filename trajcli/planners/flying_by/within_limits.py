@@ -158,11 +158,7 @@ def _rates_along(course: Course, start: State) -> Array:
 def _within_limits(
     courses: Sequence[Course], zones: Sequence[ZoneAround], ends: tuple[Array, Array]
 ) -> tuple[FlyByChain, list[FlownPart], float]:
-    """Return the fastest chain found whose parts keep all limits and zones, its parts, and its `model`.
-
-    Raises:
-        PlanningError: When none is found.
-    """
+    """Return the fastest chain found whose parts keep all limits and zones, its parts, and its `model`."""
     found, errors = [], []
     laws = CourseLaws()
     for by_order in (True, False):
@@ -205,11 +201,7 @@ def _kept(
 def _lowered(
     chain: FlyByChain, parts: Sequence[FlownPart], sizes: list[int], shares: Array, tempos: Array
 ) -> bool:
-    """Lower the pace of parts that are over a limit, and the size of zones that are left.
-
-    Returns:
-        Whether there was any.
-    """
+    """Lower the pace of parts that are over a limit, and the size of zones that are left."""
     changed = False
     for number, part in enumerate(parts):
         findings = findings_of(chain, number, part)

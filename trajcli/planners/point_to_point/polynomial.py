@@ -96,11 +96,7 @@ def _from_rest_to_rest(start: Array, end: Array, limits: Limits) -> float:
 
 @cache
 def _normalised_peaks(conditions: int) -> tuple[tuple[float, float], ...]:
-    """Return the least and largest value of each derivative, order 1 to 3, from 0 to 1 in the time 1.
-
-    Args:
-        conditions: How many derivatives each end gives, the position counted; all but that are zero.
-    """
+    """Return the least and largest value of each derivative, order 1 to 3, from 0 to 1 in the time 1."""
     unit_end = np.zeros((conditions, 1))
     unit_end[0] = 1.0
     unit = hermite_coefficients(np.zeros((conditions, 1)), unit_end, np.array(1.0))[:, None, :]

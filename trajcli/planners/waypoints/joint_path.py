@@ -159,14 +159,7 @@ def polyline_through(points: PointTable, corner: Array, robot: Robot, *, smooth:
 def _with_parabolas(
     s: Array, points: Array, blends: Array, stops: Sequence[int]
 ) -> tuple[PiecewisePolynomial, Array]:
-    """Return segments with parabolas of lengths (m,) at points (m, n), and how far these are missed, (m, n).
-
-    Args:
-        s: Parameter at each point, shape (m,).
-        points: To pass.
-        blends: Zero at the stops.
-        stops: Points at which the path is sharp, the ends among them.
-    """
+    """Return segments with parabolas of lengths (m,) at points (m, n), and by what these are missed."""
     slopes = np.diff(points, axis=0) / np.diff(s)[:, None]
     curves, missed = [], np.zeros_like(points)
     for low, high in pairwise(stops):

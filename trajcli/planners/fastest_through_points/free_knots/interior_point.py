@@ -191,13 +191,7 @@ class _Iterate:
         return None
 
     def _search(self, change: Change, d_slack: _Slacks, inverse: Array) -> float:
-        """Go along a change as far as the merit falls; return which part of it that is.
-
-        Args:
-            change: Of the motion.
-            d_slack: Of the slacks.
-            inverse: By how much bends answer to what misses the points, shape (K, n, M - 1, 2).
-        """
+        """Go along a change as far as the merit falls; return which part of it that is."""
         slack, walk, product = self._slack, self._walk, self._product
         stiff = max(1.0, _STIFF * float(np.abs(self._force.room).max()))
         before, missed = self._merit(self.motion, walk, slack, stiff)
