@@ -36,10 +36,10 @@ _WHERE = {
 """The module and class of each planner, by its name in job files."""
 
 _BETWEEN = {
-    "attach": "payload.Attach",
-    "detach": "payload.Detach",
-    "tool": "tool_change.ChangeTool",
-    "signal": "signal.SetSignal",
+    "attach": "between_moves.Attach",
+    "detach": "between_moves.Detach",
+    "tool": "between_moves.ChangeTool",
+    "signal": "between_moves.SetSignal",
 }
 """Likewise what stands between moves, by its key in job files."""
 

@@ -1,19 +1,23 @@
-"""Payload between moves: what the tool takes up and leaves, without motion and in no time."""
+"""Entries between moves: payload, tool and signals change where the arm stands, in no time."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from trajcli.curves.piecewise import constant
-from trajcli.kinematics.robot import Payload, Robot
-from trajcli.language.dynamics import PayloadSpec
-from trajcli.language.numbers import FlawError, Model
+from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.kinematics.robot import MountedTool, Payload, Robot
+from trajcli.language.dynamics import NamedTool, PayloadSpec
+from trajcli.language.numbers import FlawError, Model, Number
+from trajcli.language.signals import SignalName
 from trajcli.planners.planner import Planned, Planner
 from trajcli.trajectory import State
+from trajcli.units import Quantity
 
 
 class BetweenMoves(Planner):
@@ -80,3 +84,51 @@ class Detach(BetweenMoves):
             text = "nothing is attached here that could be detached"
             raise FlawError(text, "detach", hint="attach a payload in a move before it")
         return None
+
+
+class ChangeTool(BetweenMoves):
+    """From here on poses are of another tool; what is attached keeps its place on the flange."""
+
+    needs_geometry: ClassVar[str] = "a tool change"
+    changes_tool: ClassVar[bool] = True
+
+    planner: SkipJsonSchema[Literal["tool"]] = Field("tool", exclude=True)
+    tool: Annotated[
+        MountedTool, NamedTool("The tool from here on: a name under `tools`, or a pose on the flange.")
+    ]
+
+    @property
+    def caption(self) -> str:
+        """Its label, or the name of the tool."""
+        return self.label or self.tool.name
+
+    def equipped(self, robot: Robot) -> Robot:
+        """Return the robot with the tool."""
+        return robot.with_tool(self.tool)
+
+    def plan(self, start: State, robot: Robot) -> Planned:
+        """Return the curve of no length.
+
+        Raises:
+            PlanningError: When the arm moves there.
+        """
+        if start.velocity.any():
+            joint = int(np.abs(start.velocity).argmax())
+            amounts: Amounts = {
+                "joint": robot.joint_names[joint],
+                "velocity": Amount(float(start.velocity[joint]), 1, joint),
+            }
+            message = "a tool is changed where the arm stands, and {joint} moves with {velocity}"
+            hint = "end the move before it at rest: leave `velocity` out of its target"
+            raise PlanningError(Problem(message, hint, amounts=amounts))
+        return super().plan(start, robot)
+
+
+class SetSignal(BetweenMoves):
+    """A signal has a value from here on."""
+
+    needs_geometry: ClassVar[str] = ""
+
+    planner: SkipJsonSchema[Literal["signal"]] = Field("signal", exclude=True)
+    signal: Annotated[str, SignalName("Name of the signal."), Field(description="Name of the signal.")]
+    value: Annotated[float, Number(Quantity("ratio"), "What it is from here on.")]
