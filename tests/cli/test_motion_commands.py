@@ -11,6 +11,7 @@ import pytest
 import yaml
 from running import EXAMPLES, JOB, call
 
+from trajcli.errors import Problem
 from trajcli.streams.recorded_motion import open_motion
 
 Capture = pytest.CaptureFixture[str]
@@ -53,6 +54,14 @@ def test_rows_go_to_standard_output_and_words_to_the_other(words: tuple[str, ...
     call(capfd, name, "rows.csv", *options, "-o", "out.csv", "-q")
     assert Path("out.csv").read_text() == out
     assert capfd.readouterr().err == ""
+
+
+def test_resampled_rows_that_jump_are_not_written(capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("trajcli.cli.edit.new_jumps", lambda *_: [Problem("the position of j1 jumps")])
+    code, _, err = call(capfd, "resample", "rows.csv", "--rate", "20", "-o", "out.csv")
+    assert code == 1
+    assert "the position of j1 jumps" in err
+    assert not Path("out.csv").exists()
 
 
 def test_laws_on_the_command_line(capfd: Capture) -> None:

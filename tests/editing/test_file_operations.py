@@ -90,6 +90,46 @@ def test_resampled_rows_are_on_the_polynomial(tmp_path: Path) -> None:
     assert worst_deviation(read(path), coarse)[1] < 1e-9
 
 
+def sampled(path: Path, rate: float, decimals: int, duration: float = 2.0) -> Path:
+    """Write rows of a quintic at a rate, stamps with some decimals."""
+    t = np.append(np.arange(round(duration * rate, 6) // 1) / rate, duration)
+    q, qd, *_ = quintic(t, 1.0, duration)
+    rows = "".join(f"{a:.{decimals}f},{b:.9f},{c:.9f}\n" for a, b, c in zip(t, q, qd, strict=True))
+    path.write_text("t,q1,qd1\n" + rows)
+    return path
+
+
+@pytest.mark.parametrize(("rate", "decimals", "finer"), [(100, 3, 1000), (10, 2, 100), (1000, 3, 1000)])
+def test_a_finer_grid_has_each_time_once(rate: float, decimals: int, finer: float, tmp_path: Path) -> None:
+    """Where the stamps have no more decimals than the new times need."""
+    found = resample(read(sampled(tmp_path / "rows.csv", rate, decimals)), finer)
+    t = np.arange(2 * finer + 1) / finer
+    assert found.rows.t == pytest.approx(t, abs=1e-12)
+    assert found.rows.q[:, 0] == pytest.approx(quintic(t, 1.0, 2.0)[0], abs=1e-5)
+
+
+def test_a_time_that_is_the_end_but_for_its_rounding_is_no_row_beside_it(tmp_path: Path) -> None:
+    found = resample(read(sampled(tmp_path / "rows.csv", 24, 2, 2.05)), 24)
+    assert (
+        found.rows.t.tolist() == np.loadtxt(tmp_path / "rows.csv", delimiter=",", skiprows=1)[:, 0].tolist()
+    )
+
+
+@pytest.mark.parametrize(("rate", "decimals"), [(1000, 3), (100, 2), (10, 1)])
+def test_a_cut_has_every_row_between_its_ends(rate: int, decimals: int, tmp_path: Path) -> None:
+    path = sampled(tmp_path / "rows.csv", rate, decimals)
+    found = cut(read(path), 0.1, 0.7)
+    _, rows = table(path)
+    kept = rows[round(0.1 * rate) : round(0.7 * rate) + 1]
+    assert np.array_equal(np.column_stack([found.rows.t, found.rows.q]), kept[:, :2])
+    whole = join(cut(read(path), 0.0, 0.7), cut(read(path), 0.7, 2.0))
+    assert np.array_equal(whole.rows.t, rows[:, 0])
+    between = cut(read(path), 0.1 + 0.4 / rate, 0.7)
+    assert between.rows.t[0] == 0.1 + 0.4 / rate
+    with pytest.raises(InputError, match="is not before --to"):
+        cut(read(path), 0.1, 0.1 + 0.1 / rate)
+
+
 def test_a_coarse_grid_says_how_far_its_curve_is_off(tmp_path: Path) -> None:
     """Straight lines over T through sin t are off by 1 - cos(T / 2) at most."""
     t = np.linspace(0, np.pi, 3142)

@@ -66,9 +66,10 @@ def run_resample(options: ResampleCommand) -> int:
     motion = _read(options.file, options)
     hertz = _hertz(options.rate)
     found = resample(motion, hertz)
+    _check_continuity(motion, found)
+    joint, size = worst_deviation(motion, found.as_written())
     _write(found, options)
     rows = f"{found.rows.t.size} row{'s' * (found.rows.t.size != 1)}"
-    joint, size = worst_deviation(motion, found.as_written())
     off = f"the curve through them is off by at most {size:.3g} rad or m, in {found.joint_names[joint]}"
     _say(options, f"{found.rows.source}: resampled at {hertz:.9g} Hz, {rows}; {off}")
     return 0

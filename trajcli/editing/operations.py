@@ -48,14 +48,15 @@ def cut(motion: EditedMotion, first: float, last: float) -> EditedMotion:
         InputError: When the motion is not there at these times, or they are not in order.
     """
     t = motion.rows.t
+    room = _room(motion, float(np.diff(t).min()) / 4)
     for name, time in (("--from", first), ("--to", last)):
-        if not t[0] - _room(motion) <= time <= t[-1] + _room(motion):
+        if not t[0] - room <= time <= t[-1] + room:
             extent = f"{motion.rows.source} goes from {t[0]:.15g} s to {t[-1]:.15g} s"
             raise InputError(f"{name} {time:.9g}: {extent}", hint="give times of the file, s")
-    if not first < last:
+    begin, end = _snapped(motion, np.array([first, last]), room)
+    if not begin < end:
         raise InputError(f"--from {first:.9g} is not before --to {last:.9g}")
-    inside = t[(t > first + _room(motion)) & (t < last - _room(motion))]
-    return _at(motion, np.concatenate([[_snapped(motion, first)], inside, [_snapped(motion, last)]]))
+    return _at(motion, np.concatenate([[begin], t[(t > begin) & (t < end)], [end]]))
 
 
 def resample(motion: EditedMotion, rate: float) -> EditedMotion:
@@ -68,16 +69,15 @@ def resample(motion: EditedMotion, rate: float) -> EditedMotion:
     grid = UniformGrid(float(t[-1] - t[0]), rate, float(t[0]))
     times = np.concatenate([stamps for stamps, _ in grid.blocks()])
     times[-1] = t[-1]
-    nearest = _nearest(motion, times)
-    meant = np.abs(t[nearest] - times) <= _room(motion)
-    return _at(motion, np.where(meant, t[nearest], times))
+    # no two of the times come to one row, but the last two
+    return _at(motion, np.unique(_snapped(motion, times, _room(motion, (0.5 - _NEAR) / rate))))
 
 
-def _room(motion: EditedMotion) -> float:
-    """Return how far a stamp may be off, by its rounding, s."""
+def _room(motion: EditedMotion, most: float) -> float:
+    """Return how far a stamp may be off, by its rounding and at most by `most`, s."""
     t, resolution = motion.rows.t, motion.rows.resolution
     relative = resolution.relative_time * float(np.abs(t).max())
-    return 2 * max(resolution.time, relative) + _NEAR * float(np.diff(t).min())
+    return min(2 * max(resolution.time, relative) + _NEAR * float(np.diff(t).min()), most)
 
 
 def _nearest(motion: EditedMotion, times: Array) -> np.ndarray:
@@ -87,11 +87,10 @@ def _nearest(motion: EditedMotion, times: Array) -> np.ndarray:
     return np.where(times - t[after - 1] <= t[after] - times, after - 1, after)
 
 
-def _snapped(motion: EditedMotion, time: float) -> float:
-    """Return a time, or the stamp of the row there."""
-    t = motion.rows.t
-    nearest = float(t[_nearest(motion, np.array([time]))[0]])
-    return nearest if abs(nearest - time) <= _room(motion) else time
+def _snapped(motion: EditedMotion, times: Array, room: float) -> Array:
+    """Return times, those within `room` of a row as the stamp of that row."""
+    stamps = motion.rows.t[_nearest(motion, times)]
+    return np.where(np.abs(stamps - times) <= room, stamps, times)
 
 
 def _at(motion: EditedMotion, times: Array) -> EditedMotion:
