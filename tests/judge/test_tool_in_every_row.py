@@ -56,7 +56,7 @@ def of_tool(motion: RecordedMotion, robot: Robot, interpolate: str | None = None
 @pytest.mark.parametrize("piece", [0, 1, 2046, 2047, 2048, 2498])
 def test_a_fast_piece_anywhere_in_a_long_file_is_found(piece: int, key: str, side: float) -> None:
     """More pieces than are looked at together; the slide beside moves in another one, slowly."""
-    t = np.append(0.0, np.cumsum(0.02 + 0.01 * (np.arange(2499) % 3)))
+    t = np.append(0.0, np.cumsum(0.02 + 0.01 * (np.arange(2499) % 7)))
     q = np.zeros((2500, 2))
     q[piece + 1 :, 0], q[1200:, 1] = side * 0.01, 1e-4
     rate = 0.01 / (t[piece + 1] - t[piece]) * (LEVER if key == "speed" else 1.0)

@@ -210,8 +210,6 @@ class ToolJudge:
             traces = np.clip((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
             moved = np.arccos(traces)[:, None] if angular else np.diff(poses[:, :3, 3], axis=0)
             return bool((np.linalg.norm(moved / lengths, axis=1) <= slack).all())
-        if any(values is None for values in states[:order]):
-            return True
         rates = [np.asarray(values) for values in states[1:order]]
         below = (jacobian(robot, q) @ rates[-1][..., None])[..., 0]
         if order == 3:
