@@ -131,6 +131,18 @@ def test_links_in_a_circle_are_refused() -> None:
         read(circle + joint.format("k", "b", "a") + "</robot>", root="a")
 
 
+def test_a_flaw_beyond_the_tip_is_noted() -> None:
+    joint = '<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/>{}<axis xyz="0 0 1"/></joint>'
+    arm = "".join(f'<link name="{name}"/>' for name in "wabc") + joint.format("j", "continuous", "w", "a", "")
+    flawed = joint.format("g", "fixed", "a", "b", '<origin rpy="0 0 0 1"/>')
+    other = joint.format("k", "continuous", "w", "c", '<origin xyz="0 1,5 0"/>')
+    found = read(f'<robot name="r">{arm}{flawed}{other}</robot>', tip="a")
+    left_out = [note for note in found.notes if note.endswith("the links behind it are left out")]
+    assert sorted(note.split(":")[0] for note in left_out) == ["joint g", "joint k"]
+    with pytest.raises(InputError, match="rpy"):
+        read(f'<robot name="r">{arm}{flawed}{other}</robot>', tip="b")
+
+
 def test_hints_say_what_to_do() -> None:
     with pytest.raises(InputError) as refused:
         read(changed('xyz="0.4 0 0"', 'xyz="${l} 0 0"'))

@@ -151,7 +151,7 @@ def robot_of_urdf(
     origins, table = origins_and_table(document, path, exact=exact)
     notes = [note for each in properties for note in each.notes]
     # what is not of the chain, such as a gripper, is fixed where its joints are at zero
-    behind = links_of_rows(document, path, origins, table)[1:]
+    behind = links_of_rows(document, path, origins, table, notes)[1:]
     inertias = [link_inertia(document, parts, notes) for parts in behind]
     robot = _robot(document, moving, table, properties, inertias)
     snapped = () if exact else tuple(_snapped(document, path, origins, properties))
@@ -241,11 +241,12 @@ def _limits(document: UrdfDocument, bounds: tuple[Array, Array, Array, Array], b
 
 
 def links_of_rows(
-    document: UrdfDocument, path: SerialPath, origins: Sequence[Array], table: DhTable
+    document: UrdfDocument, path: SerialPath, origins: Sequence[Array], table: DhTable, notes: list[str]
 ) -> list[list[tuple[str, Array]]]:
     """Return the links that move with the base, then with each row: names, and poses (4, 4) in its frame.
 
-    What is not of the chain, such as a gripper, is fixed where its joints are at zero.
+    What is not of the chain, such as a gripper, is fixed where its joints are at zero; what is behind a joint
+    whose origin is none is left out, which `notes` get a line for.
     """
     below: dict[str, list[JointElement]] = {}
     for joint in document.joints.values():
@@ -264,7 +265,12 @@ def links_of_rows(
             for joint in below.get(link, []):
                 if not (joint.moves and joint.name in of_chain):
                     origin = of_chain.get(joint.name)
-                    origin = origin_of(document, joint.element) if origin is None else origin
+                    try:
+                        origin = origin_of(document, joint.element) if origin is None else origin
+                    except InputError as error:
+                        flaw = error.problems[0].message
+                        notes.append(f"joint {joint.name}: {flaw}; the links behind it are left out")
+                        continue
                     links.append((joint.child, pose @ origin))
         rows.append(parts)
     return rows

@@ -66,7 +66,7 @@ def visuals_of(
     path = serial_path(document, root, tip)
     origins, table = origins_and_table(document, path, exact=exact)
     found = _Reader(document)
-    for row, links in enumerate(links_of_rows(document, path, origins, table)):
+    for row, links in enumerate(links_of_rows(document, path, origins, table, [])):
         for link, pose in links:
             for visual in (each for each in document.links[link].inside if each.name == "visual"):
                 found.add(row, pose, visual)
