@@ -396,7 +396,7 @@ def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
 
 
 def _recorded_poses(document: Document, path: str) -> RecordedPoses:
-    from trajcli.job.files.recorded_poses import read_poses
+    from trajcli.job.files.recorded_values import read_poses
 
     return read_poses(path, document)
 

@@ -66,7 +66,7 @@ def explanation(
     wanted = range(len(plan.moves)) if move is None else [move]
     report = report_of(plan, reference=True, peers=reference)
     if sensitivity:
-        from trajcli.output.sensitivity import with_savings
+        from trajcli.output.report_parts import with_savings
 
         report = with_savings(report, plan, wanted)
     report = in_units(report, units)

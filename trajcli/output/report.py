@@ -74,7 +74,7 @@ def report_of(
         peers: Whether all moves along a path are compared with toppra; implies `reference`.
         knots: Those of its trajectory, where they are known.
     """
-    from trajcli.output.effort_report import efforts_report
+    from trajcli.output.report_parts import efforts_report
 
     verdict = plan.verdict
     if knots is None and verdict.passed and has_knots(plan.trajectory):
@@ -118,7 +118,7 @@ def _signals(plan: Plan) -> list[SignalReport]:
 def _flyby(plan: Plan) -> FlyByReport | None:
     if plan.flyby is None:
         return None
-    from trajcli.output.flyby_report import flyby_report
+    from trajcli.output.report_parts import flyby_report
 
     return flyby_report(plan.flyby, plan.trajectory.joint_types, plan.trajectory.joint_names)
 
@@ -149,7 +149,7 @@ def _steps(steps: AccelerationSteps, units: Mapping[str, str]) -> list[StepRepor
 
 
 def _move(plan: Plan, index: int, *, reference: bool, peers: bool) -> MoveReport:
-    from trajcli.output.effort_report import effort_reports, mounted_report, payload_report
+    from trajcli.output.report_parts import effort_reports, mounted_report, payload_report
 
     move, span = plan.moves[index], plan.trajectory.spans[index]
     peaks = [

@@ -131,7 +131,7 @@ def _rows_of_format(
         option = "--topic" if topic is not None else "--field"
         raise InputError(f"{option} is about MCAP, and {source.file} is none", hint=f"leave {option} out")
     if kind == "mcap":
-        from trajcli.streams.logged_rows import LoggedRows
+        from trajcli.streams.row_sources import LoggedRows
 
         return LoggedRows(source, topic, field)
     if kind == "ros":

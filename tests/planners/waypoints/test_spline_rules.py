@@ -11,7 +11,6 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicHermiteSpline, CubicSpline, PchipInterpolator, make_interp_spline
 
-from trajcli.curves.splines import dense_points
 from trajcli.errors import MissingLimitError
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.planners.waypoints import spline_rules
@@ -160,7 +159,7 @@ class Dense:
 
 @pytest.fixture
 def dense(monkeypatch: pytest.MonkeyPatch, search: Search) -> Search:
-    monkeypatch.setattr(dense_points, "DensePoints", Dense)
+    monkeypatch.setattr(spline_rules, "DensePoints", Dense)
     Dense.made = []
     return search
 

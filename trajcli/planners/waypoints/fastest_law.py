@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.third_order.end_curvature import with_end_curvature
+from trajcli.curves.third_order.curved_paths import with_end_curvature
 from trajcli.curves.third_order.jerk import ThirdOrderConstraint
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
 from trajcli.curves.third_order.quartic_law import ReversingLawError

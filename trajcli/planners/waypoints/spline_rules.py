@@ -22,7 +22,7 @@ from trajcli.curves.splines.hermite import (
     quintic_through,
 )
 from trajcli.curves.splines.shape_preserving import shape_preserving
-from trajcli.curves.splines.time_allocation import CurveFamily, fastest_durations
+from trajcli.curves.splines.time_allocation import CurveFamily, DensePoints, fastest_durations
 from trajcli.curves.splines.virtual_points import continuous_acceleration
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
@@ -185,7 +185,6 @@ def _dense_durations(
     moving = np.ptp(points.positions, axis=0) > 0
     if points.count <= _DENSE or not np.isfinite(bounds[2, moving]).all():
         return
-    from trajcli.curves.splines.dense_points import DensePoints
 
     index = np.arange(points.count, dtype=np.float64)
     chords = np.linalg.norm(np.diff(points.positions, axis=0), axis=1)

@@ -1,19 +1,27 @@
-"""Efforts in reports: extremes, share of gravity and head room of each joint, and what was judged by what."""
+"""Parts of reports that few jobs have: efforts and loads, zones, and what higher limits would save."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
+from trajcli.job.report import MoveReport, Report
+from trajcli.job.reports.comparisons import SavingReport
 from trajcli.job.reports.efforts import EffortReport, EffortsReport, MountedToolReport, PayloadReport
-from trajcli.kinematics.robot import Payload, Robot
+from trajcli.job.reports.flyby import BoundReport, FlyByReport, ZoneReport
+from trajcli.kinematics.robot import QUANTITIES, JointType, Payload, Robot
 from trajcli.language.efforts import OF_ROBOT
+from trajcli.planning.flown_job import FlownZone, FlyBy
 from trajcli.planning.plan import Plan
-from trajcli.units import effort_unit
+from trajcli.units import effort_unit, joint_units
 
 if TYPE_CHECKING:
     from trajcli.dynamics.effort_bound import EffortPeak
     from trajcli.limits.effort import MoveEfforts
+    from trajcli.planning.sensitivity import Saving
+
+_NOTHING = 1e-9  # relative to the duration: what rounding leaves of no saving
 
 
 def payload_report(payload: Payload | None) -> PayloadReport | None:
@@ -106,3 +114,80 @@ def _reason(plan: Plan) -> str:
     if stated:
         return f"those of {robot.name} count where the job says `limits: {{effort: robot}}`"
     return "no limit of effort is given"
+
+
+def flyby_report(flyby: FlyBy, types: Sequence[JointType], names: Sequence[str]) -> FlyByReport:
+    """Return the report of what flying by corners gained.
+
+    Args:
+        flyby: What it is.
+        types: Of the joints.
+        names: Of the joints.
+    """
+    bound = flyby.best_bound
+    return FlyByReport(
+        duration=flyby.duration,
+        stopping=flyby.stopping,
+        saved=flyby.stopping - flyby.duration,
+        bound=None if bound is None else BoundReport(duration=bound[0], method=bound[1]),
+        searched=flyby.searched,
+        zones=[_zone(zone, types, names) for zone in flyby.zones],
+    )
+
+
+def _zone(zone: FlownZone, types: Sequence[JointType], names: Sequence[str]) -> ZoneReport:
+    unit = {"position": "m", "orientation": "rad"}.get(zone.of)
+    if unit is None:
+        unit = joint_units(types)[zone.joint or 0]
+    return ZoneReport.model_validate(
+        {
+            **{key: getattr(zone, key) for key in ZoneReport.model_fields if hasattr(zone, key)},
+            "joint": None if zone.joint is None else names[zone.joint],
+            "unit": unit,
+            "lowered": zone.pace if zone.pace < 1 else None,
+        }
+    )
+
+
+def with_savings(report: Report, plan: Plan, moves: Sequence[int]) -> Report:
+    """Return the report with what each limit that is 10 % higher would save, found by planning with it.
+
+    Args:
+        report: Of the plan.
+        plan: The plan.
+        moves: Indices of the moves that are looked at.
+    """
+    from trajcli.planning.sensitivity import savings_of
+
+    savings = list(savings_of(plan, moves))
+    of_moves = tuple(_with_own(move, plan, savings) if move.index in moves else move for move in report.moves)
+    return report.model_copy(update={"moves": of_moves, "savings": _totals(savings, plan)})
+
+
+def _with_own(move: MoveReport, plan: Plan, savings: Sequence[Saving]) -> MoveReport:
+    own = [_saving_report([one], plan) for one in savings if one.move == move.index]
+    return move.model_copy(update={"savings": sorted(own, key=lambda one: -(one.saved or 0.0))})
+
+
+def _totals(savings: Sequence[Saving], plan: Plan) -> list[SavingReport]:
+    """Return the savings of all moves together, the largest first."""
+    by_limit: dict[tuple[int, int], list[Saving]] = {}
+    for one in savings:
+        by_limit.setdefault((one.joint, one.order), []).append(one)
+    totals = [_saving_report(alike, plan) for alike in by_limit.values()]
+    return sorted(totals, key=lambda one: -(one.saved or 0.0))
+
+
+def _saving_report(savings: Sequence[Saving], plan: Plan) -> SavingReport:
+    first, known = savings[0], [one.saved for one in savings if one.saved is not None]
+    duration = math.fsum(plan.moves[one.move].duration for one in savings)
+    saved = None if len(known) < len(savings) else math.fsum(known)
+    if saved is not None and abs(saved) <= _NOTHING * duration:
+        saved = 0.0
+    return SavingReport(
+        joint=plan.trajectory.joint_names[first.joint],
+        quantity=QUANTITIES[first.order],
+        saved=saved,
+        share=None if saved is None or not duration else saved / duration,
+        reason=next((one.reason for one in savings if one.reason is not None), None),
+    )
