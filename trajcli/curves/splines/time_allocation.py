@@ -12,7 +12,7 @@ slowly, so that they serve several steps. All costs are proportional to the numb
 
 Where points are dense, a jerk limit ties the durations of many pieces together, and to change one by itself
 helps nobody. So they are passed by a smooth law u(t) of a parameter u of theirs, a cubic spline through some
-of them, whose durations are found: first a few, then more in steps, each beginning with what was found before.
+of them, whose durations are found: a few, then more in steps, each beginning with what was found before.
 
 Source: Boyd and Vandenberghe (2004), sections 11.2 and 11.3; Curtis, Powell and Reid, On the estimation of
 sparse Jacobian matrices, J. Inst. Math. Appl. 13 (1974).
