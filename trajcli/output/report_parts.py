@@ -12,13 +12,13 @@ from trajcli.job.reports.efforts import EffortReport, EffortsReport, MountedTool
 from trajcli.job.reports.flyby import BoundReport, FlyByReport, ZoneReport
 from trajcli.kinematics.robot import QUANTITIES, JointType, Payload, Robot
 from trajcli.language.efforts import OF_ROBOT
-from trajcli.planning.flown_job import FlownZone, FlyBy
 from trajcli.planning.plan import Plan
 from trajcli.units import effort_unit, joint_units
 
 if TYPE_CHECKING:
     from trajcli.dynamics.effort_bound import EffortPeak
     from trajcli.limits.effort import MoveEfforts
+    from trajcli.planning.flown_job import FlownZone, FlyBy
     from trajcli.planning.sensitivity import Saving
 
 _NOTHING = 1e-9  # relative to the duration: what rounding leaves of no saving
