@@ -11,6 +11,7 @@ import pytest
 from counted_calls import calls_of
 
 import trajcli
+from trajcli.errors import FileError
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
@@ -248,3 +249,8 @@ def test_few_bits_of_a_rate_explain_none_of_another(name: str, kind: str, roundi
         found = trajcli.check(t[:, 0], t**2 / 2.0, **rates, limits={"velocity": limit})
         explained = rounding > 0 and name == "qd" and share < 1
         assert found.verdict == ("within rounding" if explained else "exceeded"), share
+
+
+def test_a_robot_whose_name_is_too_long_for_a_file_is_an_error_of_the_file() -> None:
+    with pytest.raises(FileError, match="File name too long"):
+        trajcli.check(np.arange(3.0), np.zeros((3, 2)), robot="arm" * 100)

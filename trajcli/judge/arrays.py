@@ -146,9 +146,11 @@ def _bare(joints: int) -> Robot:
 
 
 def _changed(name: str) -> float:
-    """Return when a file was changed, so that it is read anew; 0 for names of the catalogue."""
-    path = Path(name)
-    return path.stat().st_mtime if path.is_file() else 0.0
+    """Return when a file was changed, so that it is read anew; 0 for what is no file."""
+    try:
+        return Path(name).stat().st_mtime
+    except (OSError, ValueError):
+        return 0.0
 
 
 @lru_cache(maxsize=16)
