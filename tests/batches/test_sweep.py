@@ -96,6 +96,7 @@ def test_values_are_yaml() -> None:
         ("a=1..2:1", "a range needs how many values, 2 to 1000000"),
         ("a=1..2:x", "a range needs how many values"),
         ("a=1..2:9999999", "a range needs how many values"),
+        ("a=1..2:" + 5000 * "9", "a range needs how many values"),
         ("a=0..1e400:3", "1e400 is no number from 1e-308 to 1.79e308"),
         ("a=-1.8e308..1:3", "-1.8e308 is no number"),
         ("a=0..1e-999999999:3", "1e-999999999 is no number"),

@@ -251,6 +251,7 @@ def test_a_job_that_reads_the_output_of_another_is_refused(capfd: Capture) -> No
 
 WRONG = [
     (("jobs", "-j", "0"), "-j expects 1 to 1024 processes, got '0'"),
+    (("jobs", "-j", 5000 * "9"), "-j expects 1 to 1024 processes, got '999"),
     (("jobs", "-j", "two"), "-j expects"),
     (("jobs", "--timeout", "soon"), "--timeout expects seconds, got 'soon'"),
     (("jobs", "--timeout", "inf"), "--timeout expects seconds"),

@@ -97,7 +97,7 @@ def axis_of(path: str, values: Sequence[Any]) -> Axis:
 
 def _spread(text: str, first: str, last: str, count: str | None) -> Iterator[float]:
     """Yield numbers at equal distances, both ends included; of decimals the exact ones, rounded once."""
-    if count is None or not count.isdecimal() or not 2 <= int(count) <= MOST_ROWS:
+    if not count or not count.isdecimal() or len(count) > 9 or not 2 <= int(count) <= MOST_ROWS:
         hint = f"such as {first}..{last}:9, both ends included"
         raise InputError(f"--vary {text}: a range needs how many values, 2 to {MOST_ROWS}", hint=hint)
     for end in (first, last):

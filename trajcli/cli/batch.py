@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -87,7 +88,7 @@ def processes_of(options: BatchCommand | SweepCommand) -> int:
         raise InputError("--scheduler is about a cluster", hint="add --engine dask")
     if options.count is None:
         return usable_cores()
-    if not options.count.isascii() or not options.count.isdigit() or not 1 <= int(options.count) <= 1024:
+    if not re.fullmatch("[0-9]{1,4}", options.count) or not 1 <= int(options.count) <= 1024:
         raise InputError(f"-j expects 1 to 1024 processes, got '{options.count}'")
     return int(options.count)
 

@@ -14,7 +14,7 @@ from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, shown
-from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS
+from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS, defaults_of_paths
 from trajcli.suggest import abridged, did_you_mean, valid_names
 
 _KINDS = {
@@ -320,6 +320,8 @@ def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:
         named = field is not None and get_origin(field.annotation) is dict
         if index == _tag_at(loc) and (step in PLANNERS or step in HANDLING):
             current = PLANNERS[step] if step in PLANNERS else HANDLING[step]
+        elif index == 0 and step == "defaults":
+            current = defaults_of_paths()
         elif field is not None:
             current = _model_in(field.annotation) or current
     return current
