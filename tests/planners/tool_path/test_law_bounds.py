@@ -19,7 +19,7 @@ from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import ToolLimits
-from trajcli.planners.tool_path.derivatives import PathDerivatives
+from trajcli.planners.tool_path.derivatives import PathDerivatives, path_derivatives
 from trajcli.planners.tool_path.law import LAWS, LawSpec, PathBounds, law_along, law_bounds
 
 TOOL = {"speed": 0.7, "acceleration": 2.0, "jerk": 30.0, "angular_speed": 1.5, "angular_acceleration": 4.0}
@@ -373,3 +373,19 @@ def test_a_minimum_duration_makes_no_law_faster() -> None:
         spec = LawSpec(minimum_duration=share * fastest.law.duration)
         made, _ = law_along(cornered(), spec, ToolLimits(**TOOL), "polyline")
         assert made.law.duration == pytest.approx(lasts * fastest.law.duration, rel=1e-12)
+
+
+@pytest.mark.parametrize("turn", [0.3, 1.5, 2.6])
+@pytest.mark.parametrize("radius", [1e-5, 1e-3])
+def test_corners_far_shorter_than_the_path_count_with_their_largest_curvature(
+    radius: float, turn: float
+) -> None:
+    """The oracle are second differences of positions; no break stands in the middle of the corner."""
+    behind = np.array([2.1 + 5.7 * math.cos(turn), 5.7 * math.sin(turn), 0.0])
+    chain = join([Line(np.zeros(3), np.array([2.1, 0, 0])), Line(np.array([2.1, 0, 0]), behind)], radius)
+    low, high = chain.breaks
+    p = chain.evaluate(np.linspace(low, high, 4001))[0]
+    oracle = np.linalg.norm(np.diff(p, 2, axis=0), axis=1).max() / ((high - low) / 4000) ** 2
+    fixed = FixedOrientation(np.eye(3), chain.length)
+    found = path_derivatives(ToolPath(PoseCurve(chain, fixed), (True,) * 3, "all")).curvature
+    assert 0.995 * oracle < found < 1.0001 * oracle

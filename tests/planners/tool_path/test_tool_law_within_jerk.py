@@ -112,3 +112,12 @@ def test_the_jerk_of_the_tool_around_a_rounded_corner_is_used_and_kept():
     sizes = np.linalg.norm(np.diff(positions, 3, axis=0), axis=1) / 1e-9
     assert sizes.max() < 10.0 * 1.001
     assert np.mean(sizes > 9.0) > 0.7
+
+
+def test_a_corner_between_the_samples_of_a_long_path_bends_it():
+    """It counted as straight: the limit of the jerk was kept by stretching the whole move three times."""
+    steps = ([0.0, 0.0, 0.111], [0.0, 0.1, 0.111])
+    lines = [{"line": {"from": "here", "offset": {"xyz": step}, "frame": "world"}} for step in steps]
+    corner = {**CORNER, "segments": lines, "radius": 0.001}
+    made = fastest(corner, {"acceleration": 8, "tcp": {"speed": 0.5, "acceleration": 2, "jerk": 20.0}})
+    assert "stretched" not in [event.kind for event in made.events]

@@ -277,3 +277,12 @@ def test_an_explanation_says_shape_amplitude_and_cycles(shape):
         "weave"
         not in explanation(plan("ur5e", HERE, {**move, "law": LAW}, limits=WIDE)).moves[0].path.model_dump()
     )
+
+
+def test_more_cycles_than_fit_into_memory_are_refused_with_the_shortest_length():
+    """0.2 m of 100000 cycles are 2 um each; 2e8 of them took 6 GiB for their breaks alone."""
+    move = {"planner": "line", "to": {"xyz": TO}, "law": LAW}
+    for weave in ({"length": 1e-9}, {"frequency": 2e10}):
+        text = str(refusal("ur5e", HERE, {**move, "weave": {"amplitude": A, **weave}}, limits=WIDE))
+        assert "at most 100000 cycles weave" in text
+        assert "2e-06 m or longer, not 1e-" in text

@@ -19,8 +19,6 @@ from trajcli.planners.tool_path.follow import FollowedPath
 from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.time_optimal import jerk_constraints, limits_of_law
 
-_FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
-
 _SAMPLES = 33  # of a path, at which it is looked at whether s is its length
 _AWAY = 1e-6  # relative: lengths that differ by more are two
 
@@ -113,13 +111,3 @@ class ToolCourse(Course):
     def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
         """Return the reference of the tool under a law s(t)."""
         return motion_along(self.joints.path, law, law.breaks, self.tolerance, None)
-
-
-def tool_course(joints: FollowedPath, law: LawSpec, tolerance: Tolerance) -> ToolCourse:
-    """Return a path of the tool as joints q(s).
-
-    Raises:
-        PlanningError: When no curve follows it within the tolerance.
-    """
-    finer = replace(tolerance, position=tolerance.position * _FINER, angle=tolerance.angle * _FINER)
-    return ToolCourse(joints.by_s(finer), joints.robot, joints, law, tolerance)

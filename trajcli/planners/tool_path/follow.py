@@ -301,11 +301,12 @@ class FollowedPath:
             raise diagnosis.unfit(float(error.s[0]), self.coarse.evaluate, most) from None
 
     def by_s(self, tolerance: Tolerance) -> PiecewisePolynomial:
-        """Return q(s) within a tolerance.
+        """Return q(s) within half of a tolerance: what a law multiplies the rest with must still be within.
 
         Raises:
             PlanningError: When no pieces of the allowed number are enough: names the singularity.
         """
+        tolerance = Tolerance(0.5 * tolerance.position, 0.5 * tolerance.angle)
         diagnosis = diagnosis_on_path(self.robot, self.path, self.follower)
         return _fitted(self.follower, self.path.breaks, self.coarse.evaluate, tolerance, diagnosis)
 

@@ -170,11 +170,12 @@ class ToolPathMove(Planner):
             InputError: When the fields do not make a path.
             PlanningError: When there is no such path, or the arm cannot follow it.
         """
-        from trajcli.planners.tool_path.course import tool_course
+        from trajcli.planners.tool_path.course import ToolCourse
 
         del planned
-        path = self._pinned_path(start, robot).path
-        return tool_course(followed(robot, path, start), self.law, self.tolerance.tolerance)
+        joints = followed(robot, self._pinned_path(start, robot).path, start)
+        tolerance = self.tolerance.tolerance
+        return ToolCourse(joints.by_s(tolerance), robot, joints, self.law, tolerance)
 
     @property
     def origin(self) -> Target | None:

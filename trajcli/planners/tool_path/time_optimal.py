@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.operations import scale_time
-from trajcli.curves.piecewise import (
-    PiecewisePolynomial,
-    distinct,
-)
+from trajcli.curves.piecewise import PiecewisePolynomial, distinct
 from trajcli.curves.third_order.jerk import LawJerkConstraint, ThirdOrderConstraint
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
@@ -24,7 +21,7 @@ from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, time
 from trajcli.curves.time_optimal.phase_plane import PhasePlane
 from trajcli.curves.time_optimal.switching import switching_structure
 from trajcli.kinematics.following.motion import motion_along
-from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tolerance import Tolerance, probes
 from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.kinds import TOOL_KINDS, path_constraints
@@ -43,9 +40,6 @@ from trajcli.planners.tool_constraint import ToolConstraint, ToolJerkConstraint
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
 
-_SAMPLES = 33  # of a path, at which it is looked at whether it bends
-_FINER = 0.5  # of the tolerance, for q(s): what the law multiplies it with must still be within
-
 
 def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, planner: str) -> JointMotion:
     """Return the fastest motion along a path within the limits of joints and tool.
@@ -61,7 +55,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
         PlanningError: When the joints cannot follow.
     """
     robot, path = joints.robot, joints.path
-    curve = joints.by_s(Tolerance(tolerance.position * _FINER, tolerance.angle * _FINER))
+    curve = joints.by_s(tolerance)
     _require_acceleration(curve, robot, planner)
     limits, tcp = robot.limits, limits_of_law(spec, robot.limits.tcp, path.speeds)
     with joints.diagnosed():
@@ -120,7 +114,7 @@ def jerk_constraints(
         spec: The law.
     """
     robot, limits = joints.robot, joints.robot.limits.tcp
-    _, first, second = joints.path.poses.evaluate(np.linspace(0.0, joints.path.length, _SAMPLES), "right")
+    _, first, second = joints.path.poses.evaluate(probes(joints.path.breaks), "right")
     straight = not second[:, :3].any()
     along = (limits.jerk if spec.jerk is None else spec.jerk) if straight else spec.jerk or math.inf
     of_tool = (math.inf if straight else limits.jerk), limits.angular_jerk

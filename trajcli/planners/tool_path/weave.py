@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from trajcli.errors import Amount, InputError
+from trajcli.errors import Amount, InputError, Problem
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.language.numbers import Flaw, Model, Number, refuse
 from trajcli.language.targets import Direction, Row
@@ -21,6 +21,7 @@ from trajcli.units import Quantity
 
 _LENGTH = Quantity("length")
 _SAME = 1e-6  # relative: a cycle whose length differs by less is the one asked for
+_MOST_CYCLES = 100_000
 
 
 class WeaveSpec(Model):
@@ -92,7 +93,7 @@ class WovenMove(ToolPathMove):
         """Return a path with its weave, if it has one.
 
         Raises:
-            InputError: When the tool only turns.
+            InputError: When the tool only turns, or there are too many cycles.
             PlanningError: When the side is along the path.
         """
         if self.weave is None or planned.path.length == 0:
@@ -104,6 +105,8 @@ class WovenMove(ToolPathMove):
             hint = "leave `weave` out, or go somewhere"
             raise InputError("a weave needs a path, and the tool stays in its place", hint=hint)
         wanted, edges = spec.cycle(self.law), [0.0, *stops_of(poses.position).tolist(), poses.length]
+        if poses.length > _MOST_CYCLES * wanted:
+            raise _too_many(poses.length / _MOST_CYCLES, wanted)
         lengths = [high - low for low, high in pairwise(edges)]
         cycles = tuple(_cycles(length / wanted) for length in lengths)
         across = None if spec.side is None else np.array(spec.side)
@@ -111,6 +114,15 @@ class WovenMove(ToolPathMove):
         used = [length / count for length, count in zip(lengths, cycles, strict=True)]
         path = replace(planned.path, poses=PoseCurve(weave, poses.orientation))
         return replace(planned, path=path, events=(*planned.events, *_fitted(used, wanted)))
+
+
+def _too_many(least: float, wanted: float) -> InputError:
+    """Return the error of cycles that are shorter than the seam allows, m."""
+    message = (
+        f"at most {_MOST_CYCLES} cycles weave about a seam, so each is {{least}} or longer, not {{wanted}}"
+    )
+    amounts = {"least": Amount(least, 0, None, "length", "up"), "wanted": Amount(wanted, 0, None, "length")}
+    return InputError(Problem(message, "let cycles be longer", field=("weave",), amounts=amounts))
 
 
 def _cycles(wanted: float) -> float:
