@@ -195,6 +195,26 @@ def test_what_is_wrong_is_said_once_on_its_line(head: str, move: str, line: int,
     assert problem.place.line == line
 
 
+WORDS = [
+    ("planner: quintic, to: pose, approach: {distance: 4, frame: cel}", "cel"),
+    ("planner: quintic, to: pose, approach: {distance: 4, law: {speed: -7}}", "-7"),
+    ("planner: quintic, to: pose, approach: {distance: 4, zone: -7}", "-7"),
+    ("planner: quintic, to: {joints_by: 3}, zone: -7, approach: {distance: 4, zone: 5}", "-7"),
+    ("planner: quintic, to: {from: pose, frame: cel}, approach: {distance: 4, zone: 5}", "cel"),
+    ("planner: quintic, to: pose, retreat: {distance: 4, frame: cel}", "cel"),
+    ("planner: quintic, to: pose, retreat: {distance: 4, zone: {radius: 7}}", "radius"),
+]
+
+
+@pytest.mark.parametrize(("move", "word"), WORDS)
+def test_what_is_wrong_in_a_part_is_shown_where_it_is_written(move: str, word: str) -> None:
+    with pytest.raises(InputError) as caught:
+        planned(moves(move))
+    (problem,) = caught.value.problems
+    assert problem.place is not None
+    assert problem.place.column == len("  - {") + move.index(word) + 1
+
+
 LABELLED = """\
 moves:
   - {planner: jerk_limited, to: pose, approach: 40, label: pick up}

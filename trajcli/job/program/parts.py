@@ -77,11 +77,9 @@ class Parts:
         first["to"] = _relative(target, name, offset, frame)
         first |= _zone(fields["approach"])
         last = _relative(target, "here", back, frame) if self._names.waits(name) else target
-        straight = self._straight(fields, "approach", path, last, entry)
-        of_target = {key: rest[key] for key in _OF_THE_TARGET if key in rest}
-        kept = {key: node for key, node in fields_of(straight.node).items() if key != "zone"}
-        ending = MovePart(_mapping(entry, {**kept, **of_target}), straight.places)
-        return [*parts, self._with_defaults(MovePart(_mapping(entry, first))), ending]
+        before = MovePart(_mapping(entry, first), _written_in((*path, "approach"), "zone", "frame"))
+        ending = self._straight(fields, "approach", path, last, entry)
+        return [*parts, self._with_defaults(before), ending]
 
     def _target(self, target: Node, path: _Path) -> str:
         """Return the name of a point that is the target of a move without its rates."""
@@ -93,14 +91,16 @@ class Parts:
         self, fields: Mapping[str, Node], key: str, path: _Path, target: Node, entry: Node
     ) -> MovePart:
         """Return the straight part of an approach or a retreat."""
-        given = fields[key]
-        law = given.child("law")
+        given, relative = fields_of(fields[key]), target is not fields.get("to")
+        of_end = given if key == "retreat" else fields
         move = {name: fields[name] for name in _OF_ALL_PARTS if name in fields}
-        move |= {"planner": entry._replace(value="line"), "to": target, **_zone(given)}
-        places: dict[_Path, _Path] = {}
-        if law is not None:
-            move["law"], places[("law",)] = law, (*path, key, "law")
-        return self._with_defaults(MovePart(_mapping(entry, move), places), fastest=True)
+        move |= {"planner": entry._replace(value="line"), "to": target}
+        move |= {name: of_end[name] for name in _OF_THE_TARGET if name in of_end}
+        if "law" in given:
+            move["law"] = given["law"]
+        names = ["law", *["zone"] * (of_end is given), *["frame"] * relative]
+        part = MovePart(_mapping(entry, move), _written_in((*path, key), *names))
+        return self._with_defaults(part, fastest=True)
 
     def _with_defaults(self, part: MovePart, *, fastest: bool = False) -> MovePart:
         """Return a part with the defaults of the job where it does not say otherwise."""
@@ -158,6 +158,11 @@ class Parts:
             hint = "one of x, -x, y, -y, z, -z, or three numbers"
             raise self._names.refused(str(error), path, hint) from None
         return -axis if negative else axis
+
+
+def _written_in(path: _Path, *names: str) -> dict[_Path, _Path]:
+    """Return where fields of a part are written that stand in its approach or its retreat."""
+    return {("to", name) if name == "frame" else (name,): (*path, name) for name in names}
 
 
 def _zone(given: Node) -> dict[str, Node]:
