@@ -176,6 +176,21 @@ def test_phases_of_whole_periods(smooth: bool) -> None:
         assert count * period <= fastest * 1.001 + 5 * period
 
 
+def test_periods_are_counted_from_what_a_law_needs_and_not_from_a_faster_motion() -> None:
+    """Limits that differ by direction make a motion in 101 s: counting on from there took minutes."""
+    tried = []
+
+    class Counted(PhasesInPeriods):
+        def lengths(self, distance: float, bounds: Any, count: int) -> tuple[int, int, int] | None:
+            tried.append(count)
+            return super().lengths(distance, bounds, count)
+
+    found = Counted(1e-3, smooth=True).common([500.0], [[1000.0, 0.1, 50.0]], 101.05)
+    assert found is not None
+    assert found[0] * 1e-3 == pytest.approx(_fastest(500.0, 1000.0, 0.1, 50.0, smooth=True), rel=1e-4)
+    assert len(tried) < 50
+
+
 def _fastest(distance: float, velocity: float, acceleration: float, jerk: float, *, smooth: bool) -> float:
     """Return the duration of the fastest motion from rest to rest, by ruckig."""
     ruckig = pytest.importorskip("ruckig")

@@ -21,6 +21,7 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits
 from trajcli.limits.kinds import path_constraints
+from trajcli.planners.tool_constraint import KnownTool
 
 _SAMPLES = 9  # of a path, its ends included
 _BEND = 0.9  # of an acceleration, or of a jerk, that a bend of the path may take
@@ -110,9 +111,16 @@ class Course(ABC):
         """The limits of the jerk of the tool along it, as far as laws keep them."""
         return ()
 
+    @property
     @abstractmethod
+    def tool(self) -> KnownTool:
+        """The tool along it."""
+
     def tool_rates(self, s: Array) -> Array:
         """Return sizes of p', p'', w and w' at s (m,), (4, m)."""
+        _, *rates = self.tool.poses.evaluate(np.clip(s, 0.0, self.tool.length))
+        sizes = np.linalg.norm(np.reshape(rates, (2, -1, 2, 3)), axis=3)
+        return np.asarray(sizes.transpose(2, 0, 1).reshape(4, -1))
 
     @abstractmethod
     def tool_constraint(self) -> PathConstraint:

@@ -70,15 +70,14 @@ class JointCourse(Course):
         """Limits of the tool."""
         return self.robot.limits.tcp
 
-    def tool_rates(self, s: Array) -> Array:
-        """Return sizes of p', p'', w and w' at s (m,), (4, m)."""
-        _, first, second = ToolOfJoints(self.curve, self.robot).evaluate(s)
-        sizes = [np.linalg.norm(rows.reshape(-1, 2, 3), axis=2) for rows in (first, second)]
-        return np.stack([sizes[0][:, 0], sizes[1][:, 0], sizes[0][:, 1], sizes[1][:, 1]])
+    @property
+    def tool(self) -> ToolOfJoints:
+        """The tool along it."""
+        return ToolOfJoints(self.curve, self.robot)
 
     def tool_constraint(self) -> PathConstraint:
         """Return the limits of the tool along it."""
-        return ToolConstraint(ToolOfJoints(self.curve, self.robot), self.tcp, oblique=True)
+        return ToolConstraint(self.tool, self.tcp, oblique=True)
 
     @property
     def jerk_constraints(self) -> tuple[ThirdOrderConstraint, ...]:
@@ -86,7 +85,7 @@ class JointCourse(Course):
         jerk = self.tcp.jerk, self.tcp.angular_jerk
         if not np.isfinite(jerk).any():
             return ()
-        return (ToolJerkConstraint(ToolOfJoints(self.curve, self.robot), jerk),)
+        return (ToolJerkConstraint(self.tool, jerk),)
 
     def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
         """Return nothing: its tool follows the joints."""

@@ -452,7 +452,8 @@ def _comes_back_as_it_went(problem: BoundaryProblem) -> bool:
     if problem.control != "position" or problem.displacement or not problem.initial[2]:
         return False
     speeds = problem.initial[1], problem.final[1]
-    return problem.initial[2] == problem.final[2] and abs(speeds[0] + speeds[1]) <= _ALIKE * abs(speeds[0])
+    alike = math.isclose(problem.initial[2], problem.final[2])
+    return alike and abs(speeds[0] + speeds[1]) <= _ALIKE * abs(speeds[0])
 
 
 def _inside(value: float, lower: float, upper: float) -> float:

@@ -10,6 +10,7 @@ import pytest
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.read import job_from_text
+from trajcli.planners.ruckig import BoundaryProblem, fastest
 from trajcli.planning.plan import Plan, plan_job
 
 PLANNERS = ("jerk_limited", "trapezoid", "cubic", "quintic", "septic", "spline", "time_optimal")
@@ -77,3 +78,12 @@ def test_an_acceleration_at_the_start_is_refused_by_name(tag: str, velocity: lis
     }
     with pytest.raises(InputError, match=f"{tag} cannot start with an acceleration"):
         plan_job(job_from_text(json.dumps(job)))
+
+
+def test_accelerations_that_differ_by_rounding_do_not_end_the_process() -> None:
+    """Ruckig 0.19 crashes where a joint comes back as it went: here its accelerations differ in the last bit."""
+    speed, change = 0.009168044450836289, -3.806479155775645
+    limits = np.array([3.0, 5.0, 40.0])[:, None] * [-1.0, 1.0]
+    last = (0.0, -speed, np.nextafter(change, 0.0))
+    with pytest.raises(PlanningError, match="no motion within"):
+        fastest(BoundaryProblem("j1", (0.0, speed, change), last, limits))

@@ -273,3 +273,24 @@ def off_chords(plan):
         along = ((q - first) * weight) @ line / (line @ (weight * line))
         largest = max(largest, float(np.abs(q - first - along[:, None] * line).max()))
     return largest
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_jerk_that_differs_by_direction_bounds_the_fastest_by_its_larger_side(straight, sign):
+    """The oracle is a motion within all limits, of jerks 1000, -10 and 1000 in turn: the bound was 1.47 s."""
+    low, high = np.array([10.0, 1000.0])
+    rise, fall = 1 / high, 2 / low  # s for each unit of acceleration
+    times, jerks = np.array([rise, fall, rise]), np.array([high, -low, high])
+    p = v = a = 0.0
+    for t, j in zip(times, jerks, strict=True):
+        p, v, a = p + v * t + a * t**2 / 2 + j * t**3 / 6, v + a * t + j * t**2 / 2, a + j * t
+    assert abs(v) < 1e-12
+    assert abs(a) < 1e-12
+    faster = times.sum() * p ** (-1 / 3)  # with as much jerk the distance grows with the third power of time
+    case = {"waypoints": [[0.0], [0.5 * sign], [1.0 * sign]], "limits": {}}
+    jerk = [-10, 1000] if sign > 0 else [-1000, 10]
+    robot = {"name": "one", "joints": [{"velocity": 10, "acceleration": 10, "jerk": jerk}]}
+    plan = plan_of(case, robot=robot, straight=straight)
+    certificate = plan.moves[0].planned.certificate
+    assert 0.5 < certificate.lower < faster < plan.trajectory.duration

@@ -7,6 +7,8 @@ from start to target that leaves out all points between.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from trajcli.curves.turning_bound import MonotoneStretches, durations_by_joint, turning_points
@@ -18,6 +20,7 @@ _SOLVED = 1e-9  # relative: the accuracy of ruckig's durations
 
 def shortest_duration(problem: WaypointProblem) -> tuple[float, int | None]:
     """Return a proven lower bound of the duration, s, and the joint that needs it; None: several together."""
+    problem = replace(problem, jerk=problem.jerk * problem.looser)
     ends = np.concatenate([problem.states[0], problem.states[-1]], axis=1)
     direct = alone_times(problem, problem.points[-1] - problem.points[0], ends)
     direct = np.where(np.isfinite(direct), direct * (1 - _SOLVED), 0.0)

@@ -28,6 +28,7 @@ class WaypointProblem:
         fixed: Which of them are given, shape (K + 1, n, 2); all at the start and at the target.
         least: Shortest duration of each segment, shape (K,).
         position: Lower and upper bounds, shape (n, 2), perhaps infinite.
+        looser: How many times larger the jerk may be in one direction, shape (n,): what bounds count with.
     """
 
     points: Array
@@ -38,6 +39,7 @@ class WaypointProblem:
     fixed: NDArray[np.bool_]
     least: Array
     position: Array
+    looser: Array | float = 1.0
 
     @property
     def segments(self) -> int:
@@ -117,15 +119,15 @@ class WaypointProblem:
         time, lengths = self.units
         rates = [(lengths / time**order)[:, None] for order in range(3)]
         first = self.points[0]
-        return WaypointProblem(
-            (self.points - first) / lengths,
-            self.velocity / rates[1],
-            self.acceleration / rates[2],
-            self.jerk * time**3 / lengths,
-            self.states / np.concatenate(rates[1:], axis=1),
-            self.fixed,
-            self.least / time,
-            (self.position - first[:, None]) / rates[0],
+        return replace(
+            self,
+            points=(self.points - first) / lengths,
+            velocity=self.velocity / rates[1],
+            acceleration=self.acceleration / rates[2],
+            jerk=self.jerk * time**3 / lengths,
+            states=self.states / np.concatenate(rates[1:], axis=1),
+            least=self.least / time,
+            position=(self.position - first[:, None]) / rates[0],
         )
 
     def only(self, kept: Sequence[int]) -> WaypointProblem:

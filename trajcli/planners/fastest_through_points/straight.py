@@ -97,7 +97,10 @@ def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> t
     along, _ = _on_line(points)
     moving = line != 0
     bounds = [bounds_along(line, limit)[None] for limit in (problem.velocity, problem.acceleration)]
-    jerk = np.array([(problem.jerk[moving] / np.abs(line[moving])).min()])
+    jerk, loosest = (
+        (each[moving] / np.abs(line[moving])).min(keepdims=True)
+        for each in (problem.jerk, problem.jerk * problem.looser)
+    )
     states, fixed = np.zeros((len(points), 1, 2)), np.zeros((len(points), 1, 2), dtype=bool)
     fixed[[0, -1]] = True
     for k, order in np.argwhere(problem.fixed[first : last + 1].any(axis=1)).tolist():
@@ -108,7 +111,9 @@ def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> t
         states[k, 0, order] = rate
     least = problem.least[first:last]
     free = np.array([[-np.inf, np.inf]])
-    law = WaypointProblem(along[:, None], bounds[0], bounds[1], jerk, states, fixed, least, free)
+    law = WaypointProblem(
+        along[:, None], bounds[0], bounds[1], jerk, states, fixed, least, free, loosest / jerk
+    )
     return law, line
 
 

@@ -180,9 +180,9 @@ def shared(entered: float | None, left: float | None, length: float) -> tuple[fl
     gap = _LEFT * length
     if left - entered >= gap:
         return entered, left
-    middle = min(max(0.5 * length, left), entered)  # nearer to the zone that takes less
-    if left > 0.5 * length:
+    middle = 0.5 * length
+    if left > middle:
         return left - gap, left
-    if entered < 0.5 * length:
+    if entered < middle:
         return entered, entered + gap
     return middle - 0.5 * gap, middle + 0.5 * gap

@@ -77,6 +77,9 @@ class PhasesInPeriods:
             bounds: Of each.
             least: Shortest duration, s.
         """
+        for distance, (velocity, acceleration, *_) in zip(distances, bounds, strict=True):
+            top = min(velocity, math.sqrt(distance * acceleration))  # of a trapezoid, which no law undercuts
+            least = max(least, (distance / top + top / acceleration) * (1 - 10 * _WHOLE))
         first = max(math.ceil(least / self._period - _WHOLE), 4 if self._smooth else 2)
         if first > _MOST_PERIODS:
             return None

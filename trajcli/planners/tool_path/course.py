@@ -12,6 +12,7 @@ from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion, motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.planners.course import BoundsAbout, Course, PathRates, law_bounds
 from trajcli.planners.tool_constraint import ToolConstraint
@@ -72,12 +73,10 @@ class ToolCourse(Course):
         """The limits of the jerk of the tool along it, and of its law."""
         return jerk_constraints(self.joints, self.curve, self.law)
 
-    def tool_rates(self, s: Array) -> Array:
-        """Return sizes of p', p'', w and w' at s (N,), (4, N)."""
-        path = self.joints.executed
-        _, first, second = path.poses.evaluate(np.clip(s, 0.0, path.length), "right")
-        sizes = [np.linalg.norm(rows.reshape(-1, 2, 3), axis=2) for rows in (first, second)]
-        return np.stack([sizes[0][:, 0], sizes[1][:, 0], sizes[0][:, 1], sizes[1][:, 1]])
+    @property
+    def tool(self) -> ToolPath:
+        """The tool along it."""
+        return self.joints.executed
 
     def tool_constraint(self) -> PathConstraint:
         """Return the limits of the tool along it."""

@@ -33,7 +33,6 @@ from trajcli.planners.tool_path.law import LawSegment, lasting_at_least, law_bou
 from trajcli.planners.tool_path.move import ToolPathMove, ToolTarget, orientation_along
 
 _ONE_TIME = 1e-9  # of the duration: times this close to each other are one
-_SAMPLES = 257  # of a segment at which its largest curvature is looked for
 
 
 @frozen
@@ -166,7 +165,7 @@ def _law_segments(
     )
     segments = []
     for curve, vector in zip(curves, vectors, strict=True):
-        curvature = largest_norm(curve.evaluate(np.linspace(0.0, curve.length, _SAMPLES))[2])
+        curvature = largest_norm(curve.evaluate(np.zeros(1))[2])  # of a line or an arc: the same everywhere
         derivatives = PathDerivatives(True, curvature, float(np.linalg.norm(vector)) / curve.length, 0.0)
         bounds, _ = law_bounds(spec, lower, derivatives, "path")
         share = None if spec.duration is None else (spec.duration + shared) * curve.length / total

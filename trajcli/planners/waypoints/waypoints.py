@@ -240,19 +240,21 @@ def _has_rates(point: Waypoint, *, of_zero: bool) -> bool:
 
 
 def _problem(points: GivenPoints, robot: Robot, joints: NDArray[np.intp]) -> WaypointProblem:
-    """Return the problem of some joints; of a jerk that differs by direction the smaller one counts."""
+    """Return the problem of some joints; of a jerk that differs by direction it keeps the smaller one."""
     from trajcli.planners.fastest_through_points.problem import WaypointProblem
 
     limits = robot.limits
+    jerk = np.sort(np.abs(limits.jerk[joints]), axis=1)
     return WaypointProblem(
         points.positions[:, joints],
         limits.velocity[joints],
         limits.acceleration[joints],
-        np.abs(limits.jerk[joints]).min(axis=1),
+        jerk[:, 0],
         points.states[:, joints],
         points.fixed[:, joints],
         points.least,
         limits.position[joints],
+        jerk[:, 1] / jerk[:, 0],
     )
 
 
