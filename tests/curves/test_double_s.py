@@ -70,6 +70,28 @@ def test_no_profile_lasts_shorter_than_the_fastest(case: tuple[float, ...]) -> N
     assert double_s_of(distance, 0.999 * ruckig_duration(case), acceleration, jerk) is None
 
 
+@pytest.mark.parametrize("factor", [1e3, 1e6, 1e10])
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_very_slow_profiles_cover_their_distance(case: tuple[float, ...], factor: float) -> None:
+    """The velocity is then the distance over the duration: a root without cancellation says so to the last digits."""
+    distance, _, acceleration, jerk = case
+    duration = factor * ruckig_duration(case)
+    profile = double_s_of(distance, duration, acceleration, jerk)
+    assert profile is not None
+    end, peaks = followed(profile, jerk)
+    assert end[0] == pytest.approx(distance, rel=1e-14)
+    assert peaks[1] == pytest.approx(distance / duration, rel=1e-2)
+
+
+def test_no_profile_passes_its_acceleration_where_rounding_takes_the_constant_one_away() -> None:
+    rng = np.random.default_rng(5)
+    for distance, acceleration, jerk in 10 ** rng.uniform(-3, 3, (300, 3)):
+        fastest = math.fsum(fastest_double_s(distance, 1e9, acceleration, jerk).phases(jerk)[0])
+        for duration in (np.nextafter(fastest, 0), fastest, fastest * (1 + 1e-15), fastest * (1 + 1e-12)):
+            profile = double_s_of(distance, duration, acceleration, jerk)
+            assert profile is None or followed(profile, jerk)[1][2] <= acceleration * (1 + 1e-11)
+
+
 def test_a_negative_jerk_moves_backwards() -> None:
     end, _ = followed(fastest_double_s(3.0, 1.0, 2.0, 8.0), -8.0)
     np.testing.assert_allclose(end, [-3.0, 0, 0], rtol=0, atol=1e-12)

@@ -20,9 +20,9 @@ class Braking:
     """The fastest return of a state into its bounds.
 
     Attributes:
-        phases: (duration in s, constant) until all bounds are kept: the constant is the jerk, or the
-            acceleration where the jerk is unbounded. Empty where the state keeps its bounds and can go on
-            doing so.
+        phases: (duration in s, constant) until the velocity keeps its bounds, or the acceleration where that
+            alone is beyond: the constant is the jerk, or the acceleration where the jerk is unbounded. Empty
+            where the state keeps its bounds and can go on doing so.
         velocity: Seconds until the velocity keeps its bounds; 0 where it never leaves them.
         acceleration: The same for the acceleration.
         fastest: The velocity farthest beyond its bounds that cannot be avoided; the given one where none is.

@@ -30,7 +30,7 @@ PEAKS = (1.0, 2.0, 2 * math.pi, 4 * math.pi**2)
 _PIECES = 64
 _DEGREE = 9
 
-_NEWTON = 4  # steps: from nine digits that the trigonometric root has to all of them
+_ROUNDING = 1e-12  # relative: what the acceleration may be above its limit
 _JERKS = (1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0)
 
 
@@ -104,17 +104,14 @@ def double_s_of(distance: float, duration: float, acceleration: float, jerk: flo
         if velocity >= acceleration * full:
             t_a = velocity / acceleration - full
             return _lasting(duration, full, t_a)
-    root_of_jerk = math.sqrt(jerk)
-    shift = duration * root_of_jerk / 6
-    cosine = 1 - distance * root_of_jerk / (4 * shift * shift * shift)
+    # the velocity is the square of root = mean / z, with z the largest root of z^3 - z + e, 0 < e < 0.385
+    mean = math.sqrt(distance / duration)
+    cosine = -math.sqrt(27 / jerk) * mean / duration
     if cosine < -1:
         return None
-    root = shift * (1 + 2 * math.cos((math.acos(cosine) - 2 * math.pi) / 3))
-    root = max(root, math.sqrt(distance / duration))
-    for _ in range(_NEWTON):
-        value = distance + root * root * (2 * root / root_of_jerk - duration)
-        root -= value / (2 * root * (3 * root / root_of_jerk - duration))
-    return _lasting(duration, root / root_of_jerk, 0.0)
+    root = mean * math.sqrt(0.75) / math.cos(math.acos(cosine) / 3)
+    t_j = root / math.sqrt(jerk)
+    return _lasting(duration, t_j, 0.0) if t_j <= full * (1 + _ROUNDING) else None
 
 
 def _lasting(duration: float, t_j: float, t_a: float) -> DoubleS | None:

@@ -11,6 +11,7 @@ from topp_paths import SpeedCap, assert_motion, polyline, spline, symmetric
 from yaml_files import read_yaml
 
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.splines.shape_preserving import shape_preserving
 from trajcli.curves.time_optimal.parameterization import time_optimal
 
 CASES = read_yaml(Path(__file__).parents[2] / "oracles" / "time_optimal.yaml")["cases"]
@@ -50,6 +51,28 @@ def test_straight_lines_take_the_least_time(seed, scale):
     v0, v1 = (0.0, 0.0) if seed % 2 else (0.4 * v, 0.3 * v)
     found = time_optimal(path, velocity, acceleration, start_velocity=v0 * scale, end_velocity=v1 * scale)
     assert found.trajectory.duration == pytest.approx(fastest(1.0, v, up, down, v0, v1), rel=1e-9)
+    assert_motion(found, path, velocity, acceleration)
+
+
+@pytest.mark.parametrize(
+    ("points", "s", "turns"),
+    [
+        ([-0.05, -0.04, 1.83, -0.03, -0.04, 0.88, -0.07], range(7), [-0.05, 1.83, -0.04, 0.88, -0.07]),
+        ([0.04, -1.74, -1.75, 0.01, -0.01], range(5), [0.04, -1.75, 0.01, -0.01]),
+        (
+            [1.7, -1.54, 0.05, -0.03, -0.56, -0.17],
+            [0, 3.24, 4.83, 4.91, 5.44, 5.83],
+            [1.7, -1.54, 0.05, -0.56, -0.17],
+        ),
+    ],
+)
+def test_a_joint_alone_goes_from_turn_to_turn_as_fast_as_from_rest_to_rest(points, s, turns):
+    """Between close points q'' is large beside q', and the grid must be fine there: else all is slowed down."""
+    path = shape_preserving(s, np.array(points)[:, None])
+    velocity, acceleration = symmetric(2.4), symmetric(7.3)
+    found = time_optimal(path, velocity, acceleration)
+    least = sum(fastest(length, 2.4, 7.3, 7.3) for length in np.abs(np.diff(turns)).tolist())
+    assert found.trajectory.duration == pytest.approx(least, rel=0.03)
     assert_motion(found, path, velocity, acceleration)
 
 

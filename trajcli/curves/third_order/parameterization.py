@@ -105,6 +105,7 @@ def jerk_limited_time_optimal(
         UnlimitedSpeedError: When nothing limits the motion somewhere.
         UnreachableSpeedError: When the velocities at the ends are too high.
         UnsettledSpeedError: When they leave no room to keep the limits.
+        ReversingLawError: When no law leads forward from the states at the ends.
         ValueError: When bounds have another shape or sign.
     """
     bounds = [np.asarray(each, dtype=np.float64) for each in (velocity, acceleration, jerk)]

@@ -29,7 +29,7 @@ _BENT = 1e-6  # of the slopes of sd^2: a smaller difference does not say where t
 _EDGE = 1e-7  # of an interval: a point nearer to its ends is not worth a new one
 _AT = 1e-6  # of the largest sd^2: as near to it is at it
 _ROUND = 0.25  # of the triangle above an interval: what a smooth peak holds
-_SHORT = 64  # times shorter than the first intervals of a piece: there rounding is not far
+_SHORT = 4096  # times shorter than the first intervals of a piece: there rounding is not far
 _SPARING = 1.1  # by which the loss to be reached grows until there is room
 _SOFT = 1e-9  # by which rows are relaxed, so that those with next to no say in sdd have none by rounding
 
