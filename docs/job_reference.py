@@ -195,7 +195,7 @@ understand, on a rail, too:
 | `abb: [cf1, cf4, cf6, cfx]` | quadrants of joints 1, 4 and 6 (0: from 0 to 90 deg, -1: from -90 deg to \
 0), and cfx: + 4 with the wrist behind joint 1, + 2 behind the lower arm, + 1 with joint 5 below zero |
 | `kuka: {s: 2, t: 35}` | status, a number or `'B010'`: bit 0 with the wrist behind joint 1, bit 1 with \
-joint 3 on the side of 90 deg from the stretched arm, bit 2 with joint 5 above zero; turn, which may be \
+joint 3 on the side of 90 deg from the stretched arm, bit 2 with joint 5 below zero; turn, which may be \
 left out: bit 0 with joint 1 below zero, and so on |
 | `fanuc: 'N U T, 0, 0, 0'` | F with joint 5 above zero, else N; U with the elbow bent as at zero, else \
 D; T with the wrist ahead of joint 1, else B; turns of joints 1, 4 and 6, which may be left out: 0 \

@@ -160,6 +160,12 @@ def test_how_bad_a_finding_is_has_no_sign(value: float | None, limit: float, exc
         assert Finding(kind, "j1", value, limit, 0.0).excess == np.inf
 
 
+@pytest.mark.parametrize(("value", "limit"), [(1.5, 1.0), (0.5, 1.0), (-0.5, -1.0), (-1.5, -1.0)])
+def test_a_position_is_beyond_its_limit_by_the_distance_from_there(value: float, limit: float) -> None:
+    """A lower limit may be above zero, an upper one below it, and the position between zero and it."""
+    assert Finding("position", "j1", value, limit, 0.0).excess == 1.5
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_value_beyond_its_limit_is_printed_beyond_it(side: int, sign: int) -> None:

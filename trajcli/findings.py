@@ -86,10 +86,14 @@ class Finding:
 
     @property
     def excess(self) -> float:
-        """Value over limit, by magnitude; infinite where there is no such ratio. Orders findings."""
+        """Value over limit, by magnitude; infinite where there is no such ratio. Orders findings.
+
+        Of a position, whose lower limit may be above zero: 1 and what it is beyond its limit, over that.
+        """
         if not self.limit or self.value is None or self.kind in _UNORDERED:
             return math.inf
-        return abs(self.value / self.limit)
+        share = self.value / self.limit
+        return 1.0 + abs(share - 1.0) if self.kind == "position" else abs(share)
 
     def text(self, say: Callable[[Amount], str] = str) -> str:
         """Return the message with its amounts said by `say`."""

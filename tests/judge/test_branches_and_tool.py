@@ -19,7 +19,7 @@ from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.recorded_tool import ToolJudge
-from trajcli.kinematics.robot import ToolLimits
+from trajcli.kinematics.robot import ToolLimits, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 PERIOD = 4e-3
@@ -155,6 +155,74 @@ def test_a_tool_at_its_limits_is_no_false_alarm(orders: int) -> None:
     assert judgement.passed, [found.text() for found in judgement.findings]
     tight = replace(robot, limits=replace(robot.limits, tcp=ToolLimits(speed=0.1199)))
     assert not judge_motion(lambda: (motion,), Requirements(tight, tool=lambda: ToolJudge(tight, {}))).passed
+
+
+@pytest.mark.parametrize("start", [0.0, 1e8])
+def test_a_tool_at_its_limit_is_there_by_stamps_of_years_too(start: float) -> None:
+    """Stamps at 1e8 s are coarse, 1.5e-8 s: in that time this jerk, 1000 rad/s^3, adds more than a millionth."""
+    t, jerk = np.arange(9) * 0.005, np.array([1000.0] * 2 + [0.0] * 4 + [-1000.0] * 2)
+    states = [np.zeros(9) for _ in range(3)]
+    for k, j in enumerate(jerk):
+        q, v, a = (values[k] for values in states)
+        h = 0.005
+        new = q + v * h + a * h**2 / 2 + j * h**3 / 6, v + a * h + j * h**2 / 2, a + j * h
+        for values, value in zip(states, new, strict=True):
+            values[k + 1] = value
+    still = np.array([0.0, -1.2, 1.3, -0.4, 0.7, 0.2])
+    rows = [np.where(np.arange(6) == 0, values[:, None], 0.0) for values in states]
+    nothing = np.zeros(6)
+    exact = Resolution(0.0, nothing, nothing, nothing)
+    motion = RecordedMotion(
+        t + start, rows[0] + still, rows[1], rows[2], None, None, None, None, exact, "rows"
+    )
+    robot = plan().moves[0].robot
+    for share, verdict in ((1.0, "satisfied"), (1.0 - 3e-6, "exceeded")):
+        tcp = ToolLimits(angular_acceleration=10.0 * share)
+        judged_by = replace(robot, limits=replace(robot.limits, tcp=tcp))
+        required = Requirements(judged_by, interpolate="quintic", tool=lambda own=judged_by: ToolJudge(own))
+        judgement = judge_motion(lambda: [motion], required)
+        assert judgement.verdict == verdict, judgement
+
+
+@pytest.mark.parametrize("speed", [1.0, 1e-4])
+def test_a_tool_that_turns_slowly_is_no_faster_in_its_rows_than_they_say(speed: float) -> None:
+    """Up to its limit in 10.5 periods: the cubics swing over it in the eleventh alone, rows of 1 kHz keep it.
+
+    A turn of 1e-7 rad from row to row has no digits in the cosine.
+    """
+    t, ramp = np.arange(41) * 1e-3, 0.0105
+    q, qd = np.tile([0.0, -1.2, 1.3, -0.4, 0.7, 0.2], (41, 1)), np.zeros((41, 6))
+    reached = np.minimum(t, ramp)
+    q[:, 0], qd[:, 0] = speed * (0.5 * reached**2 / ramp + t - reached), speed * reached / ramp
+    nothing = np.zeros(6)
+    exact = Resolution(0.0, nothing, nothing, nothing)
+    motion = RecordedMotion(t, q, qd, None, None, None, None, None, exact, "rows")
+    robot = plan().moves[0].robot
+    robot = replace(robot, limits=replace(unlimited(6), tcp=ToolLimits(angular_speed=speed)))
+    judgement = judge_motion(lambda: [motion], Requirements(robot, tool=lambda: ToolJudge(robot)))
+    found = only(judgement, "tool_angular_speed")
+    assert (found.severity, judgement.verdict) == ("warning", "satisfied")
+    assert found.value == pytest.approx(1.00198 * speed, rel=1e-4)
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_peak_where_two_pieces_meet_is_as_uncertain_as_the_piece_that_has_it(*, backward: bool) -> None:
+    """A second of t^3, up to 6 rad/s^2, beside a millisecond without acceleration, whose rows tell it to 12 rad/s^2."""
+    t, q1, qd1 = np.array([[0.0, 1.0, 1.001], [0.0, 1.0, 1.003], [0.0, 3.0, 3.0]])
+    if backward:
+        t, q1, qd1 = 1.001 - t[::-1], q1[::-1], -qd1[::-1]
+    q, qd = np.tile([0.0, -1.2, 1.3, -0.4, 0.7, 0.2], (3, 1)), np.zeros((3, 6))
+    q[:, 0], qd[:, 0] = q1, qd1
+    off = np.full(6, 1e-6)
+    motion = RecordedMotion(
+        t, q, qd, None, None, None, None, None, Resolution(0.0, off, 0 * off, off), "rows"
+    )
+    robot = plan().moves[0].robot
+    robot = replace(robot, limits=replace(unlimited(6), tcp=ToolLimits(angular_acceleration=5.9)))
+    judgement = judge_motion(lambda: [motion], Requirements(robot, tool=lambda: ToolJudge(robot)))
+    found = only(judgement, "tool_angular_acceleration")
+    assert (found.value, found.certainty) == (pytest.approx(6.0, rel=1e-5), "exceeded")
+    assert found.rounding < 1e-3
 
 
 @cache

@@ -93,6 +93,18 @@ def test_of_joined_rows_what_is_just_above_a_limit_is_nothing(rule: str) -> None
     assert found == (far, nothing)
 
 
+@pytest.mark.parametrize("limit", [-1.0, 1.0])
+@pytest.mark.parametrize("beyond", [-0.01, 0.01])
+def test_joined_rows_beyond_an_end_of_a_range_are_so_on_either_side_of_zero(
+    limit: float, beyond: float
+) -> None:
+    """Such as beyond -0.07 rad, the upper end of the fourth joint of a Panda."""
+    found = finding(limit + beyond, kind="position", limit=limit, rule="limit")
+    assert as_joined(Judgement((found,), "cubic", 2)).verdict == "exceeded"
+    (event,) = planned(found).events
+    assert event.endswith("pass the limit of the position of j1, by a factor of 1.01")
+
+
 @pytest.mark.parametrize("rule", ["continuity", "derivative", "time", "state", "franka-jerk"])
 @pytest.mark.parametrize("value", [0.5, 1 + 1e-9, 2.0])
 def test_of_joined_rows_everything_but_limits_is_judged_as_of_any_others(rule: str, value: float) -> None:

@@ -11,7 +11,7 @@ from recorded_rows import bare_robot
 from trajcli.findings import Finding
 from trajcli.judge import joint_limits
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import Joint, Limits, LinkInertia, Robot, unlimited
+from trajcli.kinematics.robot import Friction, Joint, Limits, LinkInertia, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 SIDES = [1, -1]
@@ -172,6 +172,17 @@ def test_speeds_are_as_uncertain_beside_a_limit_by_position_as_beside_any_other(
     assert approach.certainty == speed.certainty == "exceeded"
 
 
+@pytest.mark.parametrize("side", SIDES)
+def test_limits_by_position_are_as_certain_on_lines_as_on_the_cubics_behind_them(side: int) -> None:
+    """Rows that state no velocity are joined by lines, those behind them that are slower by cubics."""
+    t, q = np.arange(5.0), np.array([0.0, 2.0, 4.0, 5.1, 6.2])
+    motion = motion_of(side * q, side * np.array([np.nan, np.nan, 1.1, 1.1, 1.1]), t=t, rounding=0.01)
+    limits = approached(side, 1.0)
+    (found,) = over(replace(motion, t=t), limits, "jtc")
+    assert (found.value, found.certainty) == (pytest.approx(side * 2.0), "exceeded")
+    assert found.rounding < 0.1
+
+
 MASS = 2.0
 
 
@@ -207,6 +218,41 @@ def test_a_force_is_as_uncertain_as_the_accelerations_of_the_joints_that_make_it
         told.append(found.rounding)
     assert told[0] == told[1] > MASS * 0.1
     assert told[2] < 1e-9
+
+
+@pytest.mark.parametrize("share", [0.5, 1.5])
+@pytest.mark.parametrize("side", SIDES)
+def test_a_torque_is_as_uncertain_as_where_the_arm_is_held(side: int, share: float) -> None:
+    """A mass of 4 kg at half a metre, held 1 rad above the horizon; positions have three decimals, rates six."""
+    link = LinkInertia(4.0, (0.0, 0.0, 0.0), (0.0,) * 6)
+    upright = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+    off, torque = 5e-4, 4.0 * 9.81 * 0.5 * np.cos(1.0)
+    limit = torque - share * off * 4.0 * 9.81 * 0.5 * np.sin(1.0)
+    limits = replace(unlimited(1), effort=np.array([[-limit, limit]]))
+    weight = np.array([0.0, 0.0, -9.81 * side])
+    arm = Robot(
+        "arm", (Joint("a", a=0.5, link=link),), limits, "standard", upright, np.eye(4), gravity=weight
+    )
+    t, still = 100.0 * np.arange(3), np.zeros((3, 1))
+    resolution = Resolution(0.0, np.array([off]), *np.full((2, 1), 5e-7))
+    rows = RecordedMotion(t, still + 1.0, still, still, None, None, None, None, resolution, "rows")
+    (found,) = judge_motion(lambda: [rows], Requirements(arm)).findings
+    assert (found.value, found.kind) == (pytest.approx(side * torque, rel=1e-5), "effort")
+    assert found.certainty == ("within rounding" if share < 1 else "exceeded")
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_viscous_friction_is_as_uncertain_as_the_velocity(side: int) -> None:
+    """A slide of no weight at 2 m/s, whose friction of 7 N s/m is a hair over its limit."""
+    slide, t, still = slides(side, 13.999), 100.0 * np.arange(3), np.zeros((3, 2))
+    joints = (slide.joints[0], replace(slide.joints[1], friction=Friction(viscous=7.0)))
+    slide = replace(slide, joints=joints)
+    speeds = np.tile([0.0, side * 2.0], (3, 1))
+    resolution = Resolution(0.0, np.zeros(2), np.array([0.0, 5e-4]), np.zeros(2))
+    rows = RecordedMotion(t, t[:, None] * speeds, speeds, still, None, None, None, None, resolution, "rows")
+    (found,) = [f for f in judge_motion(lambda: [rows], Requirements(slide)).findings if f.kind == "effort"]
+    assert (found.value, found.certainty) == (pytest.approx(side * 14.0), "within rounding")
+    assert found.rounding == pytest.approx(7.0 * (1.875 + 2.0 + 1.0) * 5e-4, rel=0.01)  # of a quintic
 
 
 @pytest.mark.parametrize("side", SIDES)

@@ -47,12 +47,20 @@ ABB = [
     ([100, -80, 5, 30, 40, 50], [1, 0, 0, 4]),
     ([-100, -80, 5, 30, -40, 50], [-2, 0, 0, 5]),
 ]
-# KUKA: A3 at 90 deg is the usual side of the elbow, bit 1; A5 above zero bit 2; wrist behind A1 bit 0
+# KUKA: A3 at 90 deg is the usual side of the elbow, bit 1; A5 below zero bit 2; wrist behind A1 bit 0. Positions
+# that controllers have written, in programs that are public, have these pairs: 2 with 2, 10, 34, 35; 6 with 26, 27, 50
 KUKA = [
-    ([10, -90, 90, 20, 30, 40], {"s": "B110", "t": "B000010"}),
-    ([-10, -90, 90, -20, -30, 40], {"s": 2, "t": "'B011011'"}),
-    ([10, -60, -60, 20, 30, 40], {"s": "B100", "t": 6}),
-    ([10, -150, 60, 20, 30, -40], {"s": "B111", "t": 34}),
+    ([10, -90, 90, 20, 30, 40], {"s": "B010", "t": "B000010"}),
+    ([-10, -90, 90, -20, -30, 40], {"s": 6, "t": "'B011011'"}),
+    ([10, -60, -60, 20, 30, 40], {"s": "B000", "t": 6}),
+    ([10, -150, 60, 20, 30, -40], {"s": "B011", "t": 34}),
+    *(
+        (
+            [-a if turn >> k & 1 else a for k, a in enumerate([10, 80, 90, 20, 30, 40])],
+            {"s": status, "t": turn},
+        )
+        for status, turn in ((2, 2), (2, 10), (2, 34), (2, 35), (6, 26), (6, 27), (6, 50))
+    ),
 ]
 # FANUC, angles of the description (joint 3 without joint 2): F where J5 is above zero, B behind J1
 FANUC = [
@@ -102,7 +110,7 @@ def horizontal(robot: Any, q: np.ndarray) -> float:
             "irb4600",
             lambda front, up, above: abb_flags([0, 0, 0, (not front) * 4 + (not up) * 2 + (not above)]),
         ),
-        ("kr6_r900", lambda front, up, above: kuka_flags((not front) + 2 * up + 4 * above, None)),
+        ("kr6_r900", lambda front, up, above: kuka_flags((not front) + 2 * up + 4 * (not above), None)),
         ("lrmate200id", lambda front, up, above: fanuc_flags("NF"[above] + "DU"[up] + "BT"[front])),
     ],
 )

@@ -253,13 +253,20 @@ def _judge_approaches(run: JudgedRun) -> None:
     if int(window.highest[pieces].max(initial=0)) < 1:
         return
     used, times = uses_of_pieces(window.coefficients[:, pieces], window.lengths[pieces], limits.approach, 1.0)
-    found = np.nonzero(exceeds(used, 1.0))
-    if not found[0].size:
-        return
-    fast = _fast_approaches(run, found, (times[found], used[found]))
+    over = np.nonzero(exceeds(used, 1.0))
+    levels = window.highest[pieces][over[0]]
+    for level in set(levels.tolist()):  # what rounding makes of pieces depends on their degree
+        found = tuple(index[levels == level] for index in over)
+        _add_approaches(run, found, (times[found], used[found]), level)
+
+
+def _add_approaches(
+    run: JudgedRun, found: tuple[NDArray[np.intp], ...], at: tuple[Array, Array], level: int
+) -> None:
+    """Add those of pieces of one degree, which determine derivatives up to a level."""
+    window, fast = run.window, _fast_approaches(run, found, at)
     certain, warned = fast.certain, np.zeros(fast.joint.size, dtype=bool)
     if not run.asked:
-        level = int(window.highest[fast.piece].max())
         explained = explained_by_law(window, fast.piece, fast.joint, 1, level)
         warned = certain & (np.abs(fast.speed) - np.abs(fast.bound) <= explained + fast.rounding)
         for end in (np.zeros_like(fast.local), window.lengths[fast.piece]):
@@ -322,7 +329,7 @@ def _fast_approaches(
     joint, piece = limited[column % limited.size], piece + pieces.start
     chosen = window.coefficients[:, piece, joint]
     position, speed = horner(chosen, local), horner(derivative_coefficients(chosen, 1), local)
-    rows = window.piece_rows(piece, joint, max(int(window.highest[piece].max()), 1))
+    rows = window.piece_rows(piece, joint, int(window.highest[piece[0]]))
     upwards = column < limited.size
     low, high = limits.position[joint].T
     distance = np.where(upwards, high - position, position - low)
@@ -335,6 +342,7 @@ def _fast_approaches(
 
 
 _STILL = 1e-9  # rad/s or m/s: rest, as files of nine decimals tell it
+_UNKNOWN = 1e9  # SI: of a rate that rounding hides
 _ACCELERATED = 3  # degree from which on pieces have an acceleration
 
 
@@ -373,7 +381,7 @@ def _stated_efforts(dynamics: InverseDynamics, window: Intervals, curved: NDArra
 
     At rest friction is that of the motion beside.
     """
-    q, qd, qdd = (*window.states, None, None)[:3]
+    q, qd, qdd = window.states
     middle = window.lengths[curved, None] / 2
     chosen = window.coefficients[:, curved]
     here, rate = (horner(derivative_coefficients(chosen, order), middle) for order in (0, 1))
@@ -421,14 +429,16 @@ class _OverEffort:
         )
 
     def _rounding(self, piece: int, local: float) -> float:
-        """Return by how much the effort may be off by the rounding of the accelerations."""
-        count = len(self.dynamics.robot.joints)
-        window = self.run.window
-        level = max(int(window.highest[piece]), 1)
-        rows = window.piece_rows(np.full(count, piece), np.arange(count), level)
-        position = horner(window.coefficients[:, piece], np.full(count, local))
-        inertia = np.abs(self.dynamics.mass_matrix(position)[self.joint])
-        return float(inertia @ rows.error(2))
+        """Return by how much the effort may be off by the rounding of each number of the rows."""
+        window, joints = self.run.window, np.arange(len(self.dynamics.robot.joints))
+        rows = window.piece_rows(np.full(joints.size, piece), joints, int(window.highest[piece]))
+        errors = np.minimum([rows.error(order) for order in range(3)], _UNKNOWN)
+        chosen = window.coefficients[:, piece]
+        state = [horner(derivative_coefficients(chosen, k), np.full(joints.size, local)) for k in range(3)]
+        moved = np.eye(errors.size).reshape(-1, *errors.shape) * errors + state
+        efforts = self.dynamics.rigid_effort(*np.swapaxes([*moved, state], 0, 1))[:, self.joint]
+        viscous = self.dynamics.robot.joints[self.joint].friction.viscous * errors[1, self.joint]
+        return float(np.abs(efforts[:-1] - efforts[-1]).sum() + viscous)
 
     def _finding(self, piece: int, local: float, rounding: float) -> Finding:
         from trajcli.limits.effort import effort_excess

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.findings import Collector, Finding, at_time
+from trajcli.geometry.rotation import log
 from trajcli.judge.intervals import DENSE, Intervals
 from trajcli.judge.tool_path import RecordedPath
 from trajcli.kinematics.dexterity import characteristic_length
@@ -135,16 +136,16 @@ class ToolJudge:
     def _judge_limits(
         self, window: Intervals, pieces: slice, robot: Robot, move: int, *, asked: bool
     ) -> None:
-        coefficients = window.coefficients[:, pieces]
-        breaks = window.t[pieces.start] + np.append(0.0, np.cumsum(window.lengths[pieces]))
-        peaks = tool_peaks(robot, breaks, coefficients)
+        breaks = np.append(0.0, np.cumsum(window.lengths[pieces]))  # stamps of some years are coarse
+        peaks = tool_peaks(robot, breaks, window.coefficients[:, pieces])
         for kind in (kind for kind in TOOL_KINDS if kind.key in peaks):
             peak = peaks[kind.key]
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
             if order > int(window.highest[pieces].max()) or peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
                 continue
-            warned = not asked and self._only_between(window, pieces, robot, kind, peak)
-            self._add_peak(window, pieces, robot, kind, peak, move, warned=warned)
+            at = self._piece_at(window, pieces, robot, kind, breaks, peak.time)
+            warned = not asked and self._only_between(window, pieces, robot, kind, peak, at)
+            self._add_peak(window, pieces, robot, kind, peak, at, move, warned=warned)
 
     def _add_peak(
         self,
@@ -153,15 +154,15 @@ class ToolJudge:
         robot: Robot,
         kind: LimitKind,
         peak: ToolPeak,
+        at: tuple[int, float],
         move: int,
         *,
         warned: bool,
     ) -> None:
-        limit = float(getattr(robot.limits.tcp, kind.key))
-        piece = self._piece_at(window, pieces, robot, kind, peak.time)
+        limit, (piece, local) = float(getattr(robot.limits.tcp, kind.key)), at
         rounding = self._rounding(window, piece, kind)
-        row = window.row_at(piece, peak.time - float(window.t[piece]))
-        finding = replace(tool_excess(kind, peak.upper_bound, limit, peak.time), row=row, rounding=rounding)
+        row, time = window.row_at(piece, local), float(window.t[piece]) + local
+        finding = replace(tool_excess(kind, peak.upper_bound, limit, time), row=row, rounding=rounding)
         certain = peak.upper_bound - limit > rounding
         count = max(self._over(window, pieces, robot, kind), 1)
         self._worst.add(
@@ -175,22 +176,29 @@ class ToolJudge:
         )
 
     @staticmethod
-    def _piece_at(window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, time: float) -> int:
-        """Return the piece with its peak at a time: of two that meet there the one with the higher peak."""
+    def _piece_at(
+        window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, breaks: Array, time: float
+    ) -> tuple[int, float]:
+        """Return which piece has its peak at a time, and when in it; of two that meet the higher one."""
         near = _MEET * float(window.lengths[pieces].min())
-        found = np.searchsorted(window.t, [time - near, time + near], "right") - 1
-        before, after = np.clip(found, pieces.start, pieces.stop - 1).tolist()
-        if before == after:
-            return int(after)
-        peaks = [
-            tool_peaks(robot, np.append(0.0, window.lengths[piece]), window.coefficients[:, [piece]])
-            for piece in (before, after)
-        ]
-        high, other = (peak[kind.key].upper_bound for peak in peaks)
-        return int(before if high > other else after)
+        found = np.searchsorted(breaks, [time - near, time + near], "right") - 1
+        before, after = np.clip(found, 0, breaks.size - 2).tolist()
+        if before != after:
+            high, other = (
+                tool_peaks(robot, breaks[k : k + 2], window.coefficients[:, [pieces.start + k]])
+                for k in (before, after)
+            )
+            after = before if high[kind.key].upper_bound > other[kind.key].upper_bound else after
+        return pieces.start + after, time - float(breaks[after])
 
     def _only_between(
-        self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, peak: ToolPeak
+        self,
+        window: Intervals,
+        pieces: slice,
+        robot: Robot,
+        kind: LimitKind,
+        peak: ToolPeak,
+        at: tuple[int, float],
     ) -> bool:
         """Return whether rows that stand dense keep a limit, as far as their differences make it certain."""
         limit = float(getattr(robot.limits.tcp, kind.key))
@@ -198,17 +206,14 @@ class ToolJudge:
         lengths = window.lengths[pieces, None]
         if lengths.max() > DENSE or peak.upper_bound > _TWICE * limit:
             return False
-        piece = self._piece_at(window, pieces, robot, kind, peak.time)
-        rounding = self._rounding(window, piece, kind)
-        slack = limit * (1 + _CLOSE) + rounding
+        slack = limit * (1 + _CLOSE) + self._rounding(window, at[0], kind)
         rows = slice(pieces.start, pieces.stop + 1)
         states = tuple(None if values is None else values[rows] for values in window.states)
         q = np.asarray(states[0])
         if order == 1:
             poses = forward(robot, q)
             turns = np.swapaxes(poses[:-1, :3, :3], 1, 2) @ poses[1:, :3, :3]
-            traces = np.clip((np.trace(turns, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)
-            moved = np.arccos(traces)[:, None] if angular else np.diff(poses[:, :3, 3], axis=0)
+            moved = log(turns) if angular else np.diff(poses[:, :3, 3], axis=0)
             return bool((np.linalg.norm(moved / lengths, axis=1) <= slack).all())
         rates = [np.asarray(values) for values in states[1:order]]
         below = (jacobian(robot, q) @ rates[-1][..., None])[..., 0]

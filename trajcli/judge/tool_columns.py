@@ -19,7 +19,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.findings import Collector, Finding, at_time, tool_excess_amounts
 from trajcli.frozen import frozen
-from trajcli.geometry.rotation import matrix_from_quaternion
+from trajcli.geometry.rotation import log, matrix_from_quaternion
 from trajcli.judge.motion import MotionJudge, Requirements
 from trajcli.judge.rounding import stated_errors
 from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
@@ -215,12 +215,7 @@ class _Judge:
             values, poses = self._of_first_tool(values, first[:, :3, 3] - poses[:, :3, 3]), first
         before = poses[:1, :3, :3] if self._last is None else self._last
         turns = np.concatenate([before, poses[:, :3, :3]])
-        steps = turns[1:] @ np.swapaxes(turns[:-1], 1, 2)
-        axes = np.stack([steps[:, 2, 1] - steps[:, 1, 2], steps[:, 0, 2] - steps[:, 2, 0]], axis=1)
-        axes = 0.5 * np.concatenate([axes, (steps[:, 1, 0] - steps[:, 0, 1])[:, None]], axis=1)
-        sines = np.linalg.norm(axes, axis=1)
-        angles = np.arctan2(sines, 0.5 * (np.trace(steps, axis1=1, axis2=2) - 1.0))
-        turned = self._turned + np.cumsum(axes * (angles / np.maximum(sines, 1e-300))[:, None], axis=0)
+        turned = self._turned + np.cumsum(log(turns[1:] @ np.swapaxes(turns[:-1], 1, 2)), axis=0)
         self._turned, self._last = turned[-1], poses[-1:, :3, :3]
         if self._rates is None:
             self._rates = MotionJudge(Requirements(_bare((*_AXES, *_TURNS), 3)))

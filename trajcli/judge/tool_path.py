@@ -171,12 +171,8 @@ class RecordedPath:
         """Put rows that are beside the path on the other side of the nearest corner, where they are nearer.
 
         Both sides of a sharp corner are as near as the samples are apart, and further on, too, where a path
-        comes back on its own way: only the orientation tells them apart.
-
-        Args:
-            s: Their places, shape (N,): some are replaced.
-            sizes: What they are off there, shape (N, 2): likewise.
-            poses: Of the tool, shape (N, 4, 4).
+        comes back on its own way: only the orientation tells them apart. Of the rows put there s (N,) and
+        `sizes` (N, 2) are replaced.
         """
         inner = self._path.breaks[1:-1]
         beside = np.flatnonzero(exceeds(sizes, self._limits).any(axis=1))
@@ -244,12 +240,7 @@ class RecordedPath:
 
         A path may pass a place twice, or end where it starts: of the first row the earliest place counts, and
         behind it, of places that are as near, the one to which the tool gets when it goes on along the path.
-
-        Args:
-            square: Squared distances of rows from samples, shape (N, samples).
-            own: Coordinates of the rows, shape (N, d).
-            t: Their times, s, shape (N,).
-            poses: Of the tool, shape (N, 4, 4).
+        `square` (N, samples) are squared distances of the rows, `own` (N, d) their coordinates.
         """
         found = np.empty(len(own), dtype=np.intp)
         for k, coordinates in enumerate(own):

@@ -65,9 +65,6 @@ def _turn_x(alpha: float, a: float) -> Array:
 
 def _stacked(first: Limits, others: Limits) -> Limits:
     """Return the limits of a joint and those behind it; those of the tool are the others'."""
-    position, velocity, acceleration, jerk = (
-        np.concatenate([first.of_order(order), others.of_order(order)]) for order in range(len(QUANTITIES))
-    )
-    by_position = np.concatenate([first.velocity_by_position, others.velocity_by_position])
-    effort = np.concatenate([first.effort, others.effort])
-    return Limits(position, velocity, acceleration, jerk, others.tcp, by_position, effort)
+    names = (*QUANTITIES, "velocity_by_position", "effort")
+    rows = {name: np.concatenate([getattr(first, name), getattr(others, name)]) for name in names}
+    return Limits(**rows, tcp=others.tcp)

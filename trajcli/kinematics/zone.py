@@ -23,6 +23,7 @@ from trajcli.curves.piecewise import (
     taylor_shift,
 )
 from trajcli.frozen import comparable, frozen
+from trajcli.geometry.rotation import log
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.kinematics.robot import Robot
 
@@ -86,10 +87,8 @@ class ZoneAround:
         """Return the distance of the tool from the corner, m, and its angle, rad, at joint values (N, n)."""
         poses = forward(self.robot, joints)
         distance = np.linalg.norm(poses[:, :3, 3] - self._pose[:3, 3], axis=1)
-        trace = np.einsum("nij,ij->n", poses[:, :3, :3], self._pose[:3, :3])
-        twice = poses[:, :3, :3].transpose(0, 2, 1) @ self._pose[:3, :3]
-        axial = np.stack([twice[:, i, j] - twice[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1)
-        return distance, np.arctan2(np.linalg.norm(axial, axis=1), trace - 1.0)
+        turns = poses[:, :3, :3].transpose(0, 2, 1) @ self._pose[:3, :3]
+        return distance, np.linalg.norm(log(turns), axis=1)
 
     def shares(self, joints: Array) -> Array:
         """Return how much of the zone is used at joint values (N, n): above 1 it has been left."""

@@ -322,7 +322,7 @@ class Bits(FieldType):
 class KukaStatus(Model):
     """Status and turn of a KUKA position."""
 
-    s: Annotated[int, Bits(31, "Status: bit 0 overhead, bit 1 elbow, bit 2 joint 5 above zero.")]
+    s: Annotated[int, Bits(31, "Status: bit 0 overhead, bit 1 elbow, bit 2 joint 5 below zero.")]
     t: Annotated[int, Bits(63, "Turn: a bit for each joint that is below zero.")] | None = None
 
 

@@ -140,3 +140,12 @@ def test_products_of_matrices_agree_with_differences_of_poses(name: str, tilted:
         spin = change[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)
         turning = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
         np.testing.assert_allclose(slopes[:, 3:, joint], turning, rtol=0, atol=1e-8)
+
+
+def test_a_last_row_with_a_beta_is_searched_for() -> None:
+    """What follows the held joint is then no screw about x: no closed form, and no failure."""
+    robot = replace(OTHER, joints=(*STANDARD[:-1], replace(STANDARD[-1], beta=1e-4)))
+    q = READY + 0.1
+    solutions = solve(robot, pose_target(forward(robot, q)), q)
+    assert (solutions.method.family, method_for(OTHER).family) == ("numeric", "joint 7 held")
+    np.testing.assert_allclose(solutions.joints[solutions.nearest(q)], q, rtol=0, atol=1e-9)

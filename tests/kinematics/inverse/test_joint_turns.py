@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from trajcli.errors import InputError
 from trajcli.kinematics.inverse.joint_turns import all_turns, beyond, choose_turns, widened
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 
@@ -84,6 +85,14 @@ def test_all_turns_of_all_joints_are_those_inside_the_limits() -> None:
         wanted = np.array(sorted(product(*choices, [joints[-1]])))
         found = np.array(sorted(map(tuple, all_turns(robot, joints))))
         np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("limits", [[(-1e12, 1e12)], [(-1000.0, 1000.0)] * 6])
+def test_turns_that_are_too_many_to_list_are_refused(limits: list[tuple[float, float]]) -> None:
+    """Limits of a thousand radians, as files have them for wheels, leave 319 turns: 10^15 choices of six joints."""
+    with pytest.raises(InputError, match="over 100000 choices of full turns"):
+        all_turns(arm(*limits), np.zeros(len(limits)))
+    assert len(all_turns(arm((-1000.0, 1000.0), LIMITS[0]), np.array([0.5, 0.5]))) == 319 * 2
 
 
 @pytest.mark.parametrize("bounds", [(-2.0, 3.0), (0.0, 1.0), (-1.0, 0.0), (-np.inf, 2.0)])

@@ -6,14 +6,17 @@ A value counts as inside while it is within `limit * (1 + 1e-9) + 1e-12`, as eve
 from __future__ import annotations
 
 from functools import lru_cache
+from math import prod
 
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.robot import Robot
 
 FULL = 2.0 * np.pi
+_LISTED = 100000  # choices of turns of one configuration
 _FEW = 4096  # values of a joint up to which all joints are moved together
 
 
@@ -82,15 +85,20 @@ def all_turns(robot: Robot, joints: Array) -> Array:
     """Return one configuration (n,) with every choice of turns inside the limits, shape (choices, n).
 
     A joint without limits keeps its value; so does one that no turn brings inside.
+
+    Raises:
+        InputError: When there are too many to list.
     """
-    wide = widened(robot.limits.position)
-    choices = []
-    for i, turns in enumerate(revolute(robot)):
-        value = float(joints[i])
-        low, high = wide[i]
-        options = [value]
+    wide, choices = widened(robot.limits.position), []
+    for value, turns, (low, high) in zip(joints, revolute(robot), wide, strict=True):
+        options = joints[:0]
         if turns and np.isfinite([low, high]).all():
-            steps = np.arange(np.ceil((low - value) / FULL), np.floor((high - value) / FULL) + 1)
-            options = [value + FULL * float(step) for step in steps] or options
-        choices.append(options)
+            first, last = np.ceil((low - value) / FULL), np.floor((high - value) / FULL)
+            options = value + FULL * np.arange(first, min(last, first + _LISTED) + 1)
+        choices.append(options if options.size else [value])
+    if prod(map(len, choices)) > _LISTED:
+        raise InputError(
+            f"the limits of {robot.name} allow over {_LISTED} choices of full turns",
+            hint="narrow the position limits of its joints",
+        )
     return np.stack(np.meshgrid(*choices, indexing="ij"), axis=-1).reshape(-1, len(choices))

@@ -21,7 +21,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.kinematics.inverse.solve import TOLERANCE, solve
 from trajcli.kinematics.inverse.target import IkTarget
-from trajcli.kinematics.robot import Joint, Limits, Robot
+from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
 
 
 def solve_pinned(
@@ -98,9 +98,7 @@ def _chain(robot: Robot, joints: Sequence[int], pins: Mapping[int, float]) -> Ar
 
 
 def _limits(robot: Robot, joints: Sequence[int]) -> Limits:
-    chosen = list(joints)
-    position, velocity, acceleration, jerk = (robot.limits.of_order(order)[chosen] for order in range(4))
-    return Limits(position, velocity, acceleration, jerk)
+    return Limits(**{name: getattr(robot.limits, name)[list(joints)] for name in QUANTITIES})
 
 
 def _with_new_rows(robot: Robot, others: Sequence[int], pins: Mapping[int, float]) -> Robot:

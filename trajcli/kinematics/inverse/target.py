@@ -72,12 +72,8 @@ class IkTarget:
 
     def flat(self) -> IkTarget:
         """Return the same targets with one batch dimension."""
-        aims = (
-            self.aims.reshape(-1, self.aims.shape[-1])
-            if self.aims.shape[-1]
-            else self.aims.reshape(self.poses.size // 16, 0)
-        )
-        return replace(self, poses=self.poses.reshape(-1, 4, 4), aims=aims)
+        poses = self.poses.reshape(-1, 4, 4)
+        return replace(self, poses=poses, aims=self.aims.reshape(len(poses), self.aims.shape[-1]))
 
 
 def pose_target(poses: ArrayLike) -> IkTarget:

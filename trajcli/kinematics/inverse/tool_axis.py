@@ -147,8 +147,8 @@ def always_vertical(arm: AxisGeometry, tool_axis: AxisName) -> bool:
 
 
 def _marker(arm: AxisGeometry, tool_axis: AxisName) -> ScrewAxis:
-    axis, tip = (cast("Floats", tuple(arm.home[:3, i].tolist())) for i in (AXES.index(tool_axis), 3))
-    return ScrewAxis(prismatic=False, direction=axis, point=tip)
+    axis = cast("Floats", tuple(arm.home[:3, AXES.index(tool_axis)].tolist()))
+    return ScrewAxis(prismatic=False, direction=axis, point=arm.tip)
 
 
 def _vertical(arm: AxisGeometry, direction: Floats) -> bool:

@@ -110,7 +110,7 @@ def kuka_flags(status: int, turn: int | None) -> VendorFlags:
     if turn is not None:
         turns = tuple((j, *((-inf, 0.0) if turn >> j & 1 else (0.0, inf))) for j in range(_SIX))
     text = f"kuka s {status}" + ("" if turn is None else f", t {turn}")
-    return VendorFlags(text, not status & 1, bool(status & 2), bool(status & 4), turns, pi / 2)
+    return VendorFlags(text, not status & 1, bool(status & 2), not status & 4, turns, pi / 2)
 
 
 def fanuc_flags(text: str) -> VendorFlags | None:
@@ -144,13 +144,13 @@ def _axes(robot: Robot, joints: Array) -> tuple[Array, Array]:
     return directions, tips[:, None] - np.cross(np.swapaxes(columns[:, :3], 1, 2), directions)
 
 
-def _wrist_centres(directions: Array, points: Array) -> tuple[Array, Array]:
-    """Return where three axes (K, 3, 3) come nearest to each other, (K, 3), and by how much they miss it."""
+def _apart(directions: Array, points: Array) -> Array:
+    """Return by how much three axes (K, 3, 3) miss the point that is nearest to them, (K,)."""
     across = np.eye(3) - directions[..., :, None] * directions[..., None, :]
     sides = (across @ points[..., None]).sum(axis=1)
     centres = np.linalg.solve(across.sum(axis=1), sides)[..., 0]
     apart = (across @ (centres[:, None] - points)[..., None])[..., 0]
-    return centres, np.linalg.norm(apart, axis=-1).max(axis=-1)
+    return np.asarray(np.linalg.norm(apart, axis=-1).max(axis=-1))
 
 
 def _posture(robot: Robot, joints: Array, first: int) -> tuple[Array, Array]:
@@ -183,7 +183,7 @@ def first_of_six(robot: Robot) -> int:
     if first >= 0 and all(kind == "revolute" for kind in kinds[first:]) and "revolute" not in kinds[:first]:
         spread = np.sin(np.arange(1.0, len(kinds) + 1))[None]  # regular, as almost everywhere
         directions, points = (part[:, first:] for part in _axes(robot, spread))
-        _, apart = _wrist_centres(directions[:, 3:], points[:, 3:])
+        apart = _apart(directions[:, 3:], points[:, 3:])
         length = float(np.linalg.norm(points[0] - points[0, 0], axis=1).max())
         parallel = float(np.linalg.norm(np.cross(directions[0, 1], directions[0, 2])))
         upright = abs(float(directions[0, 0] @ directions[0, 1]))

@@ -33,8 +33,9 @@ def method_for(robot: Robot) -> IkMethod:
         InputError: When the robot has no geometry.
     """
     arm = axis_geometry(robot)
-    tried = {} if any(joint.beta for joint in robot.joints) else FAMILIES
-    for name, most in tried.items():
+    if any(joint.beta for joint in robot.joints):
+        return numeric_method(arm)
+    for name, most in FAMILIES.items():
         if len(robot.joints) > most:
             continue
         method: IkMethod | None = import_module(f"{__package__}.{name}").match(arm)

@@ -22,7 +22,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.robot import Limits, Robot
+from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
 from trajcli.kinematics.serial_chain import links_of
 
 _JOINTS = 7
@@ -33,9 +33,8 @@ def without_last_joint(robot: Robot) -> Robot | None:
     """Return the arm of the first six of seven joints, the last one held at zero; None for other arms."""
     if len(robot.joints) != _JOINTS or robot.joint_types[-1] != "revolute":
         return None
-    limits = {name: getattr(robot.limits, name)[:-1] for name in ("position", "velocity")}
-    limits |= {name: getattr(robot.limits, name)[:-1] for name in ("acceleration", "jerk")}
-    flange = replace(robot, joints=robot.joints[:-1], limits=Limits(**limits), tool=np.eye(4))
+    limits = Limits(**{name: getattr(robot.limits, name)[:-1] for name in QUANTITIES})
+    flange = replace(robot, joints=robot.joints[:-1], limits=limits, tool=np.eye(4))
     zero = np.zeros(_JOINTS)
     tool = np.linalg.inv(forward(flange, zero[:-1])) @ forward(robot, zero)
     nearest = np.round(tool)

@@ -105,8 +105,7 @@ def match(arm: AxisGeometry) -> IkMethod | None:
         return None
     if "P" in kinds and not perpendicular(plane[0], plane[1]):
         return None
-    tip = (float(arm.home[0, 3]), float(arm.home[1, 3]), float(arm.home[2, 3]))
-    solver = Planar(plane, indices, rises[0] if rises else None, arm.axes, tip)
+    solver = Planar(plane, indices, rises[0] if rises else None, arm.axes, arm.tip)
     name = "SCARA" if rises else _NAMES[kinds]
     reason = "all turns are about parallel axes" + (", and the slide runs along them" if rises else "")
     if len(plane) == 3:

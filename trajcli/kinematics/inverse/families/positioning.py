@@ -322,7 +322,8 @@ def match(arm: AxisGeometry) -> IkMethod | None:
     structure = positioning_structure(arm) if len(arm.axes) == 3 else None
     if structure is None:
         return None
-    tip = (float(arm.home[0, 3]), float(arm.home[1, 3]), float(arm.home[2, 3]))
     name = f"{structure.name} ({arm.kinds})"
     reason = f"three joints ({arm.kinds}) that place the tcp: {structure.name}"
-    return IkMethod(name, "positioning", structure.choices, reason, Positioning(structure, tip), "position")
+    return IkMethod(
+        name, "positioning", structure.choices, reason, Positioning(structure, arm.tip), "position"
+    )

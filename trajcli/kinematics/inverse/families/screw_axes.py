@@ -87,6 +87,11 @@ class AxisGeometry:
     length: float
 
     @property
+    def tip(self) -> Floats:
+        """Where the tcp is at zero, in the base, m."""
+        return cast("Floats", tuple(self.home[:3, 3].tolist()))
+
+    @property
     def kinds(self) -> str:
         """Joint types from the base on: R or P for each."""
         return "".join("P" if axis.prismatic else "R" for axis in self.axes)

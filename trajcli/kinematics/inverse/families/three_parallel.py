@@ -116,7 +116,7 @@ def match(arm: AxisGeometry) -> IkMethod | None:
     if not 4 <= count <= 6 or set(arm.kinds) != {"R"} or not parallel(*axes[1:4]) or parallel(*axes[:2]):
         return None
     reason, choices = "axes 2, 3 and 4 are parallel", ["shoulder", "elbow"]
-    point: Floats | None = (float(arm.home[0, 3]), float(arm.home[1, 3]), float(arm.home[2, 3]))
+    point: Floats | None = arm.tip
     if count > 4 and parallel(axes[3], axes[4]):
         return None
     if count == 5:
