@@ -8,16 +8,18 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from planned_examples import planned_example
 from running import EXAMPLES, FAST, JOB, call, on_terminal
 from tiers import few
 
+import trajcli
 from trajcli.cli.frames import render_problem
 from trajcli.cli.terminal import fitted_table, is_coloured
 from trajcli.errors import Place, Problem
 from trajcli.output.report import report_of
-from trajcli.planning.tightest import tightest_of_moves
+from trajcli.planning.tightest import tightest_limit, tightest_of_moves
 from trajcli.progress import listening
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*m|\r\x1b\[2K")
@@ -104,6 +106,18 @@ def test_a_table_yields_where_it_is_told_to(monkeypatch: pytest.MonkeyPatch) -> 
     assert lines[1].endswith("100 %")
 
 
+def test_a_line_whose_ramps_are_at_the_limit_of_the_tool_says_so() -> None:
+    """Along a straight line the tool accelerates as its law does: joints at 26 % were said to be tightest."""
+    line = {"planner": "line", "to": {"from": "here", "frame": "world", "offset": {"xyz": [0, 0.1, 0.111]}}}
+    limits = {"acceleration": 40, "jerk": None, "tcp": {"speed": 1.5, "acceleration": 0.5}}
+    start = {"joints": [0, -1.57, 1.57, 0, 1.57, 0]}
+    plan = trajcli.plan({"version": 1, "robot": "ur5e", "limits": limits, "start": start, "moves": [line]})
+    tool = plan.moves[0].planned.tool
+    assert tool is not None
+    assert np.abs(tool.law.evaluate(tool.law.breaks[:-1], 2)).max() == pytest.approx(0.5)
+    assert tightest_limit(plan) == "acceleration of the tool in move 0, 100 % used"
+
+
 @pytest.mark.parametrize("name", ["pick_carry_place", "ur5e_pick", "weld_seam"])
 def test_the_tightest_limit_is_the_largest_of_the_report(name: str) -> None:
     plan = planned_example(name)
@@ -127,7 +141,7 @@ def test_the_tightest_limit_is_the_largest_of_the_report(name: str) -> None:
             )
     if name == "weld_seam":  # along the seam its joints use little
         of_tool = [move.binding for move in report.moves if move.binding and move.binding.joint is None]
-        assert [(each.quantity, round(each.used, 6)) for each in of_tool] == [("speed", 1.0)] * 2
+        assert [each.quantity for each in of_tool if round(each.used, 6) == 1.0] == ["speed"] * 2
 
 
 @pytest.mark.full

@@ -322,3 +322,13 @@ def test_a_search_from_the_motion_that_is_known_finds_what_one_from_nothing_find
         assert seconds is not None
         assert seconds >= -1e-9
         assert plan.trajectory.duration - seconds == pytest.approx(anew.trajectory.duration, rel=1e-3)
+
+
+def test_a_higher_limit_costs_no_time() -> None:
+    """What keeps a limit keeps a higher one: a search that finds a slower motion with it saves nothing."""
+    through = [{"joints": q} for q in np.random.default_rng(1).uniform(-1, 1, (5, 2)).tolist()]
+    limits = {"velocity": [1, 2], "acceleration": [3, 4], "jerk": [20, 30]}
+    plan = planned({"planner": "time_optimal", "through": through}, limits, joints=2)
+    found = saved(plan)
+    assert len(found) >= 4
+    assert min(0.0 if value is None else value for value in found.values()) == 0.0

@@ -64,7 +64,8 @@ class Saving:
         move: Index of the move.
         joint: Index.
         order: 1 for velocity, 2 acceleration, 3 jerk.
-        saved: Seconds by which the move is faster; None where no motion with the higher limit was found.
+        saved: Seconds by which the move is faster, 0 where only slower ones were found: it is within the
+            higher limit, too; None where no motion with that was found.
         reason: Why there is none.
     """
 
@@ -196,14 +197,11 @@ def _saving(plan: Plan, move: PlannedMove, joint: int, order: int) -> Saving:
         faster = plan_move_within(plan.loaded, move.index, planner, move.start, robot)
     except TrajcliError as error:
         return Saving(move.index, joint, order, None, error.problems[0].text(plan.loaded.say))
-    return Saving(move.index, joint, order, move.duration - faster.duration)
+    return Saving(move.index, joint, order, max(move.duration - faster.duration, 0.0))
 
 
 def _saving_of_chain(plan: Plan, move: PlannedMove, joint: int, order: int) -> Saving:
-    """Return what another limit of a move saves where the motion flies by its corners: of the whole chain.
-
-    What is within the lower limit is within the higher one, too: a slower motion saves nothing.
-    """
+    """Return what another limit of a move saves where the motion flies by its corners: of the whole chain."""
     from trajcli.planners.flying_by import duration_within
 
     chains = () if plan.flyby is None or plan.flyby.chains is None else plan.flyby.chains

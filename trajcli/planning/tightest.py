@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
-from trajcli.curves.extrema import peaks
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES
-from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.trajectory import Span
-
-if TYPE_CHECKING:
-    from trajcli.limits.tool_bound import ToolPeak
-
 
 _SAME = 1e-9  # relative: parts of limits that differ by less are the same
 _UNSURE = 1e-6  # relative: to which bounds of efforts and speeds of the tool are computed
@@ -86,9 +80,9 @@ def _uses(plan: Plan, index: int) -> Iterator[tuple[float, float, str, str | Non
         yield use.used, 1.0, "velocity_by_position", move.robot.joint_names[use.component]
     effort, name = _effort(plan, index)
     yield effort, 1.0 - _UNSURE, "effort", name
-    of_tool = verdict.tool_peaks[index]
-    speed, quantity = _tool_speed(move) if of_tool is None else _tool_in_joint_space(move, of_tool)
-    yield speed, 1.0 - _UNSURE, quantity, None
+    of_tool: Any = verdict.surveys[index].get("tool")
+    for k, (key, peak) in enumerate(() if of_tool is None else of_tool.peaks.items(), 1):
+        yield peak.value / getattr(move.robot.limits.tcp, key), 1.0 - k * _UNSURE, key, None
 
 
 def _effort(plan: Plan, index: int) -> tuple[float, str]:
@@ -100,18 +94,3 @@ def _effort(plan: Plan, index: int) -> tuple[float, str]:
     used = [max(high.upper_bound / upper, low.upper_bound / -lower) for high, low, (lower, upper) in sides]
     joint = int(np.argmax(used))
     return used[joint], robot.joint_names[joint]
-
-
-def _tool_speed(move: PlannedMove) -> tuple[float, str]:
-    """Return which part of the limit of the tool's speed along its path is used, and its name."""
-    tool, limits = move.planned.tool, move.robot.limits.tcp
-    if tool is None:
-        return 0.0, "speed"
-    limit, name = (limits.angular_speed, "angular_speed") if tool.pure_rotation else (limits.speed, "speed")
-    return float(peaks(tool.law, (1,))[0].magnitude[0]) / limit, name
-
-
-def _tool_in_joint_space(move: PlannedMove, peaks: Mapping[str, ToolPeak]) -> tuple[float, str]:
-    """Return the largest part of a limit of the tool that is used, and the limit's name."""
-    limits = move.robot.limits.tcp
-    return max((peak.value / getattr(limits, name), name) for name, peak in peaks.items())
