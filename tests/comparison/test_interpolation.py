@@ -70,6 +70,14 @@ def test_a_count_is_never_interpolated():
     assert found.columns[0].count == 1
 
 
+@pytest.mark.parametrize("name", ["signal.glue", "zone", "move"])
+def test_what_is_set_at_a_time_stays_until_then_between_rows_of_a_lower_rate(name):
+    """A signal of 1 from 2 s on has no half of it at 1.5 s."""
+    fine = table({"t": np.arange(7) / 2, name: np.arange(7) >= 4}, "a.csv")
+    coarse = table({"t": np.arange(4.0), name: np.arange(4) >= 2}, "b.csv")
+    assert exactly(fine, coarse, resample=True).equal
+
+
 @pytest.mark.parametrize(
     ("a", "b", "words"),
     [

@@ -67,6 +67,18 @@ def test_a_clock_that_counts_whole_nanoseconds_is_at_its_period(
     assert (told(replace(rows, t=t), "franka-fr3", "fr3-period") is not None) == broken
 
 
+@pytest.mark.parametrize("decimals", [3, 4, 9])
+def test_stamps_of_few_decimals_hide_no_missing_row(decimals: int) -> None:
+    """In milliseconds two neighbours may be off by a whole period: the one that is not there is told all the same."""
+    rows = motion(rows=21)
+    rows = replace(rows, resolution=replace(rows.resolution, time=0.5 * 10.0**-decimals))
+    assert told(rows, "franka-fr3", "fr3-period") is None
+    part = {name: np.delete(getattr(rows, name), 12, axis=0) for name in ("t", "q", "qd", "qdd")}
+    found = told(replace(rows, **part), "franka-fr3", "fr3-period")
+    assert found is not None
+    assert (found.row, found.value) == (13, pytest.approx(2e-3))
+
+
 def test_the_row_that_is_furthest_beside_its_period_is_told() -> None:
     """One interval of half of it is worse than one that lasts a tenth longer."""
     rows = motion(rows=21)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trajcli.columns import Column, parse_column
+from trajcli.columns import SIGNALS, Column, group_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
@@ -172,7 +172,7 @@ def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:
     """Return the first table's rows inside the common interval with the second's values interpolated there.
 
     Between two rows a column is the cubic through its values and its derivative's where the second table has
-    that, in the same unit; else the straight line; and where it counts, as `move` does, the earlier value.
+    that, in the same unit; else the straight line; and of `move`, `zone` and signals the earlier value.
 
     Raises:
         InputError: When not both tables have increasing times, when these share no interval, or when there is
@@ -240,7 +240,7 @@ def _interpolate(b: Table, pair: Pair, gaps: _Gaps) -> tuple[str, Array]:
     """Return the method's name and the values (N,) of the second table's column, in its own unit."""
     values = b.columns[:, pair.index_b]
     start = values[gaps.before]
-    if pair.b.whole_numbers:
+    if pair.b.whole_numbers or group_of(pair.b) == SIGNALS:
         return "the earlier row", start
     step = values[gaps.after] - start
     u = gaps.share

@@ -18,6 +18,7 @@ __all__ = ["ControllerPeriod", "FirstPoint", "IncreasingTimes", "LongestTime", "
 
 _UNITS = 4.0  # in the last place: two stamps are rounded, and their difference
 _NEXT = 1e-9  # s: a clock of a controller counts whole nanoseconds
+_WHOLE = 0.99  # of a period: a row that is off by it is missing, or doubled, however stamps are rounded
 
 
 class _Intervals(RuleCheck):
@@ -76,7 +77,7 @@ class ControllerPeriod(_Intervals):
         steps = np.diff(times)
         size = _sizes(times)
         rounding = 2 * (resolution.time + resolution.relative_time * size) + _NEXT
-        rounding += _UNITS * np.spacing(size)
+        rounding = np.minimum(rounding + _UNITS * np.spacing(size), _WHOLE * period)
         off = np.abs(steps - period)
 
         def fields(index: int) -> dict[str, Any]:

@@ -118,7 +118,7 @@ def path_reference(move: PlannedMove) -> PathReference | None:
 def reference_along(
     geometric: GeometricPath, limits: Limits, velocities: tuple[Array, Array] | None = None
 ) -> PathReference | None:
-    """Return the motion of toppra along a path of joint space; None where neither velocities are limited.
+    """Return the motion of toppra along a path of joint space; None where no rate is limited.
 
     Args:
         geometric: The path.
