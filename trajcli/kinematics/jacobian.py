@@ -16,11 +16,11 @@ from trajcli.errors import InputError
 from trajcli.kinematics.columns import (
     ZERO,
     VectorEntries,
-    advance,
     cross,
     dot,
     minus,
     plus,
+    scaled,
 )
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import (
@@ -85,10 +85,9 @@ def jacobian_dot_qd(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceF
     (a, e) = J qdd + this. In the world and base frames it is the time derivative of J times qd; for the tcp
     the same acceleration is written in the axes of the tcp.
 
-    With w the angular velocity of the link before joint i and u the velocity of the point p_i on its axis,
-    z_i' = w x z_i. So a revolute joint adds qd_i (w x z_i) to the angular part and
-    qd_i ((w x z_i) x (p - p_i) + z_i x (p' - u)) to the linear one; a prismatic joint adds qd_i (w x z_i) to
-    the linear part.
+    A joint with the column (v, w) turns by w qd, and is turned by W, the sum of those before it. So it adds
+    W x w qd to the angular part and (2 W + w qd) x v qd to the linear one: it turns the columns of those
+    behind it, and they move the tcp under its axis.
 
     Raises:
         InputError: When the robot has no geometry, or q and qd have not n finite values of the same batch.
@@ -149,23 +148,12 @@ def _bias(
     axes: Sequence[JointAxis], p: VectorEntries, rate: Sequence[Array]
 ) -> tuple[VectorEntries, VectorEntries]:
     """Return the linear and the angular acceleration of the point p without joint accelerations."""
-    velocity = linear = angular = ZERO
+    spin = linear = angular = ZERO
     for axis, speed in zip(axes, rate, strict=True):
-        velocity = advance(velocity, speed, _columns(axis, p)[0])
-    spin, point_velocity, point = ZERO, ZERO, axes[0].point
-    for axis, speed in zip(axes, rate, strict=True):
-        point_velocity = plus(point_velocity, cross(spin, minus(axis.point, point)))
-        point = axis.point
-        axis_rate = cross(spin, axis.direction)
-        if axis.prismatic:
-            linear = advance(linear, speed, axis_rate)
-            point_velocity = advance(point_velocity, speed, axis.direction)
-            continue
-        change = plus(
-            cross(axis_rate, minus(p, point)), cross(axis.direction, minus(velocity, point_velocity))
-        )
-        linear, angular = advance(linear, speed, change), advance(angular, speed, axis_rate)
-        spin = advance(spin, speed, axis.direction)
+        moved, turned = (scaled(speed, column) for column in _columns(axis, p))
+        angular = plus(angular, cross(spin, turned))
+        before, spin = spin, plus(spin, turned)
+        linear = plus(linear, cross(plus(before, spin), moved))
     return linear, angular
 
 

@@ -125,7 +125,7 @@ def compare_with_plan(
     of_file = _Rows(rows, columns, factors, groups, index, kept)
     difference = None
     for grid in _grids(plan, stamps):
-        if not _stands_on(of_file, grid, stamps):
+        if grid.count != stamps.count or not _stands_on(of_file, grid, stamps):
             continue
         first = _first_difference(of_file, plan, grid, halves * factors, stamps)
         if first is None:
@@ -209,13 +209,6 @@ def halves_of(rows: RowSource, columns: Sequence[Column], still: NDArray[np.bool
 
 
 def _grids(plan: Plan, stamps: _Stamps) -> Iterator[Grid]:
-    """Yield the grids that have as many rows as the file, and its extent; their times start at its first."""
-    for grid in _possible_grids(plan, stamps):
-        if grid.count == stamps.count:
-            yield grid
-
-
-def _possible_grids(plan: Plan, stamps: _Stamps) -> Iterator[Grid]:
     """Yield the grids of a plan on which rows may stand, one after the other: knots cost a search."""
     output, trajectory = plan.loaded.job.output, plan.trajectory
     if output.times is not None:
