@@ -119,6 +119,29 @@ def test_rounding_of_a_slide_is_no_smaller_at_a_short_arm(key: str, side: float)
 
 
 @SIDES
+@pytest.mark.parametrize("begin", [0.0, 0.3, -7.1, 1e9])
+@pytest.mark.parametrize("ends_short", [True, False])
+def test_rounding_at_a_peak_on_a_row_is_that_of_the_piece_with_the_peak(
+    ends_short: bool, begin: float, side: float
+) -> None:
+    """A cubic from rest bends by 4 v / T in its end; beside it the slide goes on evenly, in a longer interval."""
+    speed, still = side * 0.1, np.zeros(4)
+    lengths, qd = [0.5, 0.25, 0.5], [0.0, 0.0, speed, speed]
+    slide = np.cumsum([0.0, 0.0, 0.0, 0.5 * speed])
+    if not ends_short:  # to rest: the same with time reversed
+        qd, slide = qd[::-1], -slide[::-1]
+    t = begin + np.append(0.0, np.cumsum(lengths))
+    share = 6 * 2 * OFF / 0.25**2
+    for planted, certainty in ((0.5, "within rounding"), (1.5, "exceeded")):
+        robot = link(acceleration=4 * 0.1 / 0.25 - planted * (LEVER + 1.0) * share)
+        motion = rows(t, np.stack([still, slide], axis=1), np.stack([still, qd], axis=1), off=OFF)
+        (found,) = of_tool(motion, robot, "cubic")
+        assert (found.value, found.row) == (pytest.approx(1.6), 3 if ends_short else 2)
+        assert found.rounding == pytest.approx((LEVER + 1.0) * share, rel=0.1)
+        assert (found.severity, found.certainty) == ("error", certainty)
+
+
+@SIDES
 @pytest.mark.parametrize("at", [0, 4, 8])
 @pytest.mark.parametrize("key", ["speed", "angular_speed"])
 def test_a_tool_that_only_the_curve_makes_too_fast_is_a_warning(key: str, at: int, side: float) -> None:
