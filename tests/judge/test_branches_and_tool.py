@@ -121,17 +121,19 @@ def test_the_speed_of_the_tool_is_that_of_its_law() -> None:
     assert judged(motion, acceleration=acceleration * 1.001).verdict == "satisfied"
 
 
-def test_nearness_to_a_singularity_is_a_warning() -> None:
-    """The wrist of the arm is straight where joint 5 is zero."""
+@pytest.mark.parametrize("by_job", [True, False])
+def test_nearness_to_a_singularity_is_a_warning(by_job: bool) -> None:
+    """The wrist of the arm is straight where joint 5 is zero; beside the path of a move this is told, too."""
     count = 500
     q = np.tile([0.2, -1.2, 1.6, -1.0, 0.0, 0.4], (count, 1))
     q[:, 4] = np.linspace(-0.5, 0.5001, count)
     nothing = np.zeros(6)
     exact = Resolution(0.0, nothing, nothing, nothing)
-    motion = RecordedMotion(np.arange(count) * 0.01, q, None, None, None, None, None, None, exact, "rows")
-    judgement = judged(motion, by_job=False)
+    moves = np.zeros(count, int) if by_job else None
+    motion = RecordedMotion(np.arange(count) * 0.01, q, None, None, None, None, moves, None, exact, "rows")
+    judgement = judged(motion, by_job=by_job)
     found = only(judgement, "singularity")
-    assert judgement.verdict == "satisfied"
+    assert judgement.verdict == ("exceeded" if by_job else "satisfied")  # it is beside that path
     assert found.severity == "warning"
     assert abs(found.time - 2.5) < 0.3
 

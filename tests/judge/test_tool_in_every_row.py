@@ -178,12 +178,48 @@ def test_an_acceleration_of_the_tool_between_dense_rows_is_a_warning(key: str, a
     t = PERIOD * np.arange(10)
     q, qd = np.zeros((10, 2)), np.zeros((10, 2))
     qd[:, 0] = side * 0.01 * t / PERIOD * PERIOD
-    q[:, 0] = side * 0.01 * t**2 / 2
+    q[:, 0] = side * 0.01 * t**2 / 2 + 0.8  # it moves along no axis of the base
     q[at + 1 :, 0] -= side * 0.01 * 0.2 * PERIOD**2 / 6
     for limit, severity in ((1.1, "warning"), (0.99, "error")):
         (found,) = of_tool(rows(t, q, qd), link(**{key: lever * 0.01 * limit}))
         assert (found.kind, found.severity) == (f"tool_{key}", severity)
         assert found.value == pytest.approx(lever * 0.01 * 1.2, rel=1e-3)
+
+
+@SIDES
+def test_a_tool_that_stands_between_turns_is_a_warning_likewise(side: float) -> None:
+    """It stands at 500 angles, at some of which rounding makes the cosine of the angle between rows more than 1."""
+    steps = np.tile([1.0, 1.0, 0.0], 500)
+    q, qd, t = np.zeros((1501, 2)), np.zeros((1501, 2)), PERIOD * np.arange(1501)
+    q[1:, 0] = side * PERIOD * np.cumsum(steps)
+    qd[1::3, 0] = 0.8 * side
+    (found,) = of_tool(rows(t, q, qd), link(angular_speed=1.05))
+    assert (found.severity, found.certainty) == ("warning", "exceeded")
+
+
+@SIDES
+def test_an_even_turn_faster_than_the_jerk_of_the_tool_allows_is_an_error(side: float) -> None:
+    """The rows' accelerations are all 0: the tool's are L w^2 and turn, which makes the jerk L w^3 in every row."""
+    rate, t = 2.0, PERIOD * np.arange(10)
+    q, qd = np.zeros((10, 2)), np.zeros((10, 2))
+    q[:, 0], qd[:, 0] = side * rate * t, side * rate
+    (found,) = of_tool(rows(t, q, qd, 0 * q), link(jerk=0.9 * LEVER * rate**3))
+    assert (found.value, found.severity) == (pytest.approx(LEVER * rate**3, rel=1e-5), "error")
+    assert of_tool(rows(t, q, qd, 0 * q), link(jerk=1.001 * LEVER * rate**3)) == []
+
+
+@SIDES
+@pytest.mark.parametrize("key", ["speed", "angular_speed"])
+def test_dense_rows_that_are_over_a_limit_by_more_than_their_rounding_are_an_error(
+    key: str, side: float
+) -> None:
+    """Both joints are off by twice their rounding in one interval: three times that is certain."""
+    q, t = np.zeros((10, 2)), PERIOD * np.arange(10)
+    q[:, 0] = side * t
+    rounding = (1.0 if key == "angular_speed" else LEVER + 1.0) * 2 * OFF / PERIOD
+    limit = (1.0 if key == "angular_speed" else LEVER) - 3 * rounding
+    (found,) = of_tool(rows(t, q, off=OFF), link(**{key: limit}))
+    assert (found.severity, found.certainty) == ("error", "exceeded")
 
 
 # --- along a path ---
@@ -411,6 +447,41 @@ def test_jerk_of_the_tool_is_judged_where_some_rows_have_accelerations(first: bo
     assert of_tool(motion, link(jerk=1.01 * LEVER * 60e-3), "jtc") == []
 
 
+@pytest.mark.parametrize("key", ["acceleration", "angular_acceleration", "jerk", "angular_jerk"])
+def test_straight_lines_between_rows_say_nothing_of_accelerations_of_the_tool(key: str) -> None:
+    """The motion that was sampled may bend as it likes between rows that state positions alone."""
+    q, t = np.zeros((10, 2)), PERIOD * np.arange(10)
+    q[:, 0] = 5.0 * t
+    assert of_tool(rows(t, q), link(**{key: 1e-3})) == []
+
+
+@pytest.mark.parametrize(("planted", "certainty"), [(0.5, "within rounding"), (1.5, "exceeded")])
+def test_rounding_explains_a_jerk_of_the_tool_where_rows_have_no_accelerations(
+    planted: float, certainty: str
+) -> None:
+    """Other rows have them: a cubic from rest to rest has the jerk 12 d / T^3, of which d is off by two roundings."""
+    t, still, q = 0.1 * np.arange(8), np.zeros((8, 2)), np.zeros((8, 2))
+    q[6:, 0] = 1e-3
+    qdd = np.where((np.arange(8) < 4)[:, None], 0.0, np.full((8, 2), np.nan))
+    share = 12 / 0.1**3
+    limit = LEVER * share * 1e-3 - planted * (LEVER + 1.0) * share * 2 * OFF
+    (found,) = of_tool(rows(t, q, still, qdd, off=OFF), link(jerk=limit), "jtc")
+    assert (found.value, found.certainty) == (pytest.approx(LEVER * share * 1e-3, rel=1e-4), certainty)
+
+
+@pytest.mark.parametrize("pieces", [(100, 2300), (2300, 100)])
+def test_of_fast_pieces_the_fastest_one_is_named(pieces: tuple[int, int]) -> None:
+    """They are not looked at together."""
+    q = np.zeros((2500, 2))
+    for piece, size in zip(pieces, (0.01, 0.02), strict=True):
+        q[piece + 1 :, 0] += size
+    (found,) = of_tool(rows(0.02 * np.arange(2500), q), link(speed=0.1))
+    assert (found.value, found.row) == (
+        pytest.approx(LEVER * 0.02 / 0.02),
+        pytest.approx(pieces[1] + 1, abs=1),
+    )
+
+
 @pytest.mark.parametrize("jump", [1, 3, 5])
 @pytest.mark.parametrize(
     ("turn", "slide", "smooth"), [(0.035, 0.0, True), (0.045, 0.0, False), (0.0, 0.045, False)]
@@ -425,6 +496,14 @@ def test_joints_change_their_branch_where_the_tool_goes_on_as_before(
     assert ToolJudge(link()).changes_branch(q, jump) == smooth
 
 
+@pytest.mark.parametrize(("step", "smooth"), [(0.0, True), (3e-7, True), (3e-6, False)])
+def test_joints_that_jump_while_the_tool_stands_change_their_branch(step: float, smooth: bool) -> None:
+    """Of the tool that stands, a step of a micrometre or so is rounding."""
+    q = np.zeros((6, 2))
+    q[4:, 1] = step * LEVER  # in lengths of the arm
+    assert ToolJudge(link()).changes_branch(q, 3) == smooth
+
+
 def of_wrist(q: np.ndarray, size: int) -> list[Finding]:
     """Return singularities of a wrist, whose last axis goes along the first one's where its middle joint is at 0."""
     tilts = (-np.pi / 2, np.pi / 2, 0.0)
@@ -436,16 +515,39 @@ def of_wrist(q: np.ndarray, size: int) -> list[Finding]:
     return [each for each in judged if each.kind == "singularity"]
 
 
-@pytest.mark.parametrize("size", [40, 7])
-@pytest.mark.parametrize("row", [0, 2, 12, 30, 39])
-def test_the_one_row_at_a_singularity_is_found(row: int, size: int) -> None:
-    """Each row is more than a twentieth of a radian from the one before, so that all are looked at."""
-    q = np.zeros((40, 3))
-    q[:, 0] = 0.06 * np.arange(40)
-    q[:, 1] = 0.06 * np.abs(np.arange(40) - row) + 1e-5
+@SIDES
+@pytest.mark.parametrize(("count", "size"), [(40, 40), (40, 7), (600, 150)])
+@pytest.mark.parametrize("row", [0, 2, 12, 30, -1])
+def test_the_one_row_at_a_singularity_is_found(row: int, count: int, size: int, side: float) -> None:
+    """Each row is more than a twentieth of a radian from the one before, so that all are looked at.
+
+    Of axes z, x and one that is d off z the singular values are root 2, 1 and d / root 2.
+    """
+    q, row = np.zeros((count, 3)), row % count
+    q[:, 0] = side * 0.06 * np.arange(count)
+    q[:, 1] = np.minimum(0.06 * np.abs(np.arange(count) - row), 1.5) + 1e-5
     (found,) = of_wrist(q, size)
     assert (found.severity, found.row, found.time) == ("warning", row + 1, pytest.approx(PERIOD * row))
-    assert found.value < 1e-3
+    assert found.value == pytest.approx(0.5e-5, rel=1e-3)
+
+
+@pytest.mark.parametrize("size", [40, 7])
+def test_of_rows_near_to_a_singularity_the_nearest_one_is_named(size: int) -> None:
+    q = np.zeros((40, 3))
+    q[:, 0], q[:, 1] = 0.025 * np.arange(40), 0.3  # every second row is looked at
+    q[[18, 20, 22], 1] = 1.5e-3, 1e-5, 1.2e-3
+    (found,) = of_wrist(q, size)
+    assert (found.row, found.count, found.time) == (21, 3, pytest.approx(20 * PERIOD))
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e4])
+def test_an_arm_is_as_far_from_its_singularities_as_the_same_one_in_another_size(size: float) -> None:
+    both = tuple(Joint(name, "revolute", a=size) for name in ("shoulder", "elbow"))
+    arm = Robot("arm", both, unlimited(2), "standard", np.eye(4), np.eye(4))
+    q = np.stack([0.06 * np.arange(20), np.full(20, np.pi / 2)], axis=1)
+    required = Requirements(arm, tool=lambda: ToolJudge(arm))
+    judged = judge_motion(lambda: [rows(PERIOD * np.arange(20), q)], required).findings
+    assert "singularity" not in [each.kind for each in judged]
 
 
 @pytest.mark.parametrize("size", [1200, 100])
@@ -456,7 +558,52 @@ def test_a_slow_arm_that_stays_at_a_singularity_is_found(size: int) -> None:
     q[:, 1] = np.maximum(0.06 - 1e-4 * np.arange(1200), 0.0)
     (found,) = of_wrist(q, size)
     assert 600 < found.row <= 1002
-    assert found.value < 1e-3
+    assert (found.value < 1e-3, found.count) == (True, 1)
+
+
+@SIDES
+@pytest.mark.parametrize("begins", [True, False])
+def test_rounding_of_speeds_counts_with_the_speed_at_the_peak(begins: bool, side: float) -> None:
+    """An arm at 10 rad/s that brakes, or speeds up: L w^2 is largest where it is fastest, and off by 2 L w off."""
+    off, t = 1e-4, 20.0 + np.arange(2.0)
+    q, qd = np.zeros((2, 2)), np.zeros((2, 2))
+    q[1, 0], qd[0 if begins else 1, 0] = side * 5.0, side * (10.0 + 0.99 * off)
+    roundings = Resolution(0.0, np.zeros(2), np.array([off, 0.0]), np.zeros(2))
+    motion = replace(rows(t, q, qd), resolution=roundings)
+    truth = LEVER * np.hypot(10.0**2, 10.0)
+    (found,) = of_tool(motion, link(acceleration=truth))
+    assert (found.certainty, found.value) == (
+        "within rounding",
+        pytest.approx(truth + 20 * LEVER * off, abs=1e-4),
+    )
+    (found,) = of_tool(motion, link(acceleration=truth - 200 * LEVER * off))
+    assert found.certainty == "exceeded"
+
+
+@SIDES
+def test_rounding_counts_with_the_speed_between_two_rows_at_rest(side: float) -> None:
+    """A turn by d from rest to rest in a cubic: at its middle L w^2 with w = 3/2 d, of which w is off by 3 off."""
+    off, turn = 1e-4, 10.0
+    q = np.array([[-0.99 * off * side, 0.0], [side * (turn + 0.99 * off), 0.0]])
+    roundings = Resolution(0.0, np.array([off, 0.0]), np.zeros(2), np.zeros(2))
+    motion = replace(rows(np.arange(2.0), q, 0.0 * q), resolution=roundings)
+    (found,) = of_tool(motion, link(acceleration=LEVER * (1.5 * turn) ** 2))
+    assert (found.certainty, found.time) == ("within rounding", pytest.approx(0.5, abs=0.05))
+
+
+@SIDES
+def test_rounding_counts_with_the_speeds_of_joints_that_turn_against_each_other(side: float) -> None:
+    """The second link keeps its direction and the tool goes around, which only the first one's speed makes."""
+    off, rate, t = 1e-4, 100.0, np.arange(3.0)
+    both = tuple(Joint(name, "revolute", a=0.5) for name in ("shoulder", "elbow"))
+    limits = replace(unlimited(2), tcp=ToolLimits(acceleration=0.5 * rate**2))
+    arm = Robot("arm", both, limits, "standard", np.eye(4), np.eye(4))
+    turns = side * np.array([1.0, -1.0])
+    motion = rows(t, rate * t[:, None] * turns, np.tile((rate + 0.99 * off) * turns, (3, 1)))
+    rounded = replace(motion, resolution=Resolution(0.0, np.zeros(2), np.full(2, off), np.zeros(2)))
+    (found,) = of_tool(rounded, arm)
+    assert found.certainty == "within rounding"
+    assert found.value - found.limit == pytest.approx(2 * 0.5 * rate * 0.99 * off, rel=0.15)
 
 
 @SIDES

@@ -160,7 +160,7 @@ class ToolJudge:
         warned: bool,
     ) -> None:
         limit, (piece, local) = float(getattr(robot.limits.tcp, kind.key)), at
-        rounding = self._rounding(window, piece, kind)
+        rounding = self._rounding(window, at, kind)
         row, time = window.row_at(piece, local), float(window.t[piece]) + local
         finding = replace(tool_excess(kind, peak.upper_bound, limit, time), row=row, rounding=rounding)
         certain = peak.upper_bound - limit > rounding
@@ -206,7 +206,7 @@ class ToolJudge:
         lengths = window.lengths[pieces, None]
         if lengths.max() > DENSE or peak.upper_bound > _TWICE * limit:
             return False
-        slack = limit * (1 + _CLOSE) + self._rounding(window, at[0], kind)
+        slack = limit * (1 + _CLOSE) + self._rounding(window, at, kind)
         rows = slice(pieces.start, pieces.stop + 1)
         states = tuple(None if values is None else values[rows] for values in window.states)
         q = np.asarray(states[0])
@@ -234,23 +234,21 @@ class ToolJudge:
         part = twist[:, 3:] if kind.dimension == "angle" else twist[:, :3]
         return int((np.linalg.norm(part, axis=1) > limit).sum())
 
-    def _rounding(self, window: Intervals, piece: int, kind: LimitKind) -> float:
-        """Return by how much a derivative of the tool's motion may be off by the rounding of the rows.
+    def _rounding(self, window: Intervals, at: tuple[int, float], kind: LimitKind) -> float:
+        """Return by how much a derivative of the tool's motion may be off by rounding, at a time within a piece.
 
         What a slide moves by counts as a turn of the arm that moves its end as far; it turns nothing itself.
         """
-        order, angular = kind.order or 1, kind.dimension == "angle"
+        (piece, local), order, angular = at, kind.order or 1, kind.dimension == "angle"
         count = max(int(window.highest[piece]), 1)
         joints = np.arange(window.coefficients.shape[2])
         rows = window.piece_rows(np.full(joints.size, piece), joints, min(count, 3))
         turning = revolute(self._robot)
         arm = 1.0 if angular else self._length
         turns = np.where(turning, 1.0, 0.0 if angular else 1.0 / arm)
-        errors = [
-            float((turns * rows.error(k)).sum()) for k in range(min(order, int(window.highest[piece])) + 1)
-        ]
+        errors = [float((turns * rows.error(k)).sum()) for k in range(order + 1)]
         rates = [
-            float((turns * np.abs(horner(each, rows.length))).sum())
+            float((turns * np.abs(horner(each, np.array(local)))).sum())
             for each in (derivative_coefficients(window.coefficients[:, piece], k) for k in range(order + 1))
         ]
         total = arm * (errors[-1] + errors[0] * rates[order])
