@@ -235,7 +235,7 @@ class ToolJudge:
         return int((np.linalg.norm(part, axis=1) > limit).sum())
 
     def _rounding(self, window: Intervals, at: tuple[int, float], kind: LimitKind) -> float:
-        """Return by how much a derivative of the tool's motion may be off by rounding, at a time within a piece.
+        """Return by how much a derivative of the tool may be off by rounding, at a time within a piece.
 
         What a slide moves by counts as a turn of the arm that moves its end as far; it turns nothing itself.
         """
