@@ -367,3 +367,17 @@ def test_a_slide_that_stands_out_is_a_lever():
     rows[-1, :, 1] = 5.0
     around = ZoneAround(arm(ACROSS, SLIDE), np.array([0.0, 5.0]), Zone(position=5e-4 / 1.1))
     assert around.largest_share(PiecewisePolynomial(curve.breaks, rows))[0] == pytest.approx(1.1, rel=1e-3)
+
+
+@pytest.mark.parametrize(("mover", "share"), [(0, 2.0), (1, np.inf)])
+def test_a_joint_that_may_not_leave_the_corner_is_out_where_it_does_and_hides_no_other(mover, share):
+    corner = np.array([0.3, 0.7])
+    robot = random_arm(np.random.default_rng(0), 2, "standard")
+    around = ZoneAround(robot, corner, Zone(joints=(0.1, 0.0)))
+    coefficients = np.zeros((2, 1, 2))
+    coefficients[0, 0, mover], coefficients[1, 0] = 0.2, corner
+    found, _ = around.largest_share(PiecewisePolynomial(np.array([0.0, 1.0]), coefficients))
+    assert found == pytest.approx(share) or found > 1e9
+    (moved,) = around.shares(corner[None] + 0.2 * np.eye(2)[mover])
+    assert (moved == pytest.approx(2.0)) == (mover == 0)
+    assert moved > 1.0

@@ -284,6 +284,23 @@ def test_joint_limits_inside_are_the_higher_of_both_and_outside_those_of_the_mov
     assert 1.0 < np.abs(curve.evaluate(inside, 1)).max() <= 3.0
 
 
+@pytest.mark.parametrize("robot", [{"joints": 3}, "planar3r"])
+def test_a_joint_of_a_zone_that_may_not_leave_the_corner_leaves_the_others_their_sizes(robot: Any) -> None:
+    """The second one stands in both moves: any size of it, and none, is the same zone of the others."""
+    moves = to(1.0, 0.4, 0.2), to(1.0, 0.4, 1.2)
+    fields = {"robot": robot, "start": {"joints": [0.0, 0.4, 0.2]}}
+    wide, none = (flown(*moves, zone={"joints": [0.1, size, 0.1]}, **fields) for size in (0.1, 0.0))
+    assert none.trajectory.duration == wide.trajectory.duration
+    (one,), (other,) = none.flyby.zones, wide.flyby.zones
+    assert (one.joint, one.used, one.entered, one.left) == (
+        other.joint,
+        other.used,
+        other.entered,
+        other.left,
+    )
+    assert one.used <= 0.1
+
+
 def test_a_zone_may_be_an_angle_or_joints_and_all_of_them_hold():
     joints = flown(zone={"joints": 0.05})
     assert joints.flyby.zones[0].of == "joints"

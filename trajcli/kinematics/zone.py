@@ -29,6 +29,7 @@ from trajcli.kinematics.robot import Robot
 
 ZONE_RELATIVE = 1e-6
 """A zone's border is found, and its proof ends, to this part of it."""
+_STILL = 1e-12  # rad or m: a joint that stays in the corner
 _HALVINGS = 60  # of an interval: one that is shorter is a point
 _AT_ONCE = 4096  # intervals that are looked at together; a motion with more is not within its zone
 
@@ -83,6 +84,11 @@ class ZoneAround:
     def _pose(self) -> Array:
         return forward(self.robot, self.corner)
 
+    @property
+    def joint_sizes(self) -> Array:
+        """Distance of each joint from the corner that is allowed, (n,): rounding where it is none."""
+        return np.maximum(self.zone.joints or 0.0, _STILL)
+
     def offsets(self, joints: Array) -> tuple[Array, Array]:
         """Return the distance of the tool from the corner, m, and its angle, rad, at joint values (N, n)."""
         poses = forward(self.robot, joints)
@@ -98,7 +104,7 @@ class ZoneAround:
             parts = zip(self.offsets(joints), sizes, strict=True)
             used += [values / size for values, size in parts if size is not None]
         if self.zone.joints is not None:
-            used.append((np.abs(joints - self.corner) / np.array(self.zone.joints)).max(axis=1))
+            used.append((np.abs(joints - self.corner) / self.joint_sizes).max(axis=1))
         return np.asarray(np.max(used, axis=0))
 
     def holds(self, joints: Array, further: Array) -> NDArray[np.bool_]:
@@ -162,11 +168,10 @@ class ZoneAround:
                 angle = 0.5 * (w0 + w1 + turning * pieces.lengths)
                 bound = np.maximum(bound, angle / self.zone.orientation)
         if self.zone.joints is not None:
-            sizes = np.array(self.zone.joints)
             off = np.maximum(np.abs(first - self.corner), np.abs(last - self.corner))
-            at_ends = np.maximum(at_ends, (off / sizes).max(axis=1))
+            at_ends = np.maximum(at_ends, (off / self.joint_sizes).max(axis=1))
             bowed = off + rise * pieces.lengths[:, None] ** 2 / 8
-            bound = np.maximum(bound, (bowed / sizes).max(axis=1))
+            bound = np.maximum(bound, (bowed / self.joint_sizes).max(axis=1))
         return at_ends, bound
 
     def _tool_rates(self, start: Array, speed: Array, rise: Array, lengths: Array) -> tuple[Array, Array]:

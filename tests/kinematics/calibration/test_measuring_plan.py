@@ -53,6 +53,18 @@ def test_it_is_better_than_chance_and_than_the_first_ones():
     assert plan.condition == pytest.approx(values[0] / values[-1], rel=1e-5)
 
 
+def test_the_index_is_that_of_what_the_chosen_configurations_tell():
+    """Two positions have six numbers, and leave the turn of the base about the line between them open."""
+    robot = arm("ur")
+    parameters, q = parse_parameters(robot, "base"), configurations(robot, 20, np.random.default_rng(3))
+    plan = measuring_plan(robot, q, parameters, 2, 1.0, "position")
+    rows = difference_jacobian(robot, q[plan.chosen], parameters)[:, :3]
+    values = np.linalg.svd(rows.reshape(6, 6), compute_uv=False)
+    assert plan.seen.rank == 5
+    assert plan.index == pytest.approx(index_of(rows, 5), rel=1e-6)
+    assert plan.condition == pytest.approx(values[0] / values[4], rel=1e-6)
+
+
 def test_candidates_lie_within_the_limits_and_are_always_the_same():
     robot = arm("puma")
     low, high = np.full(6, -1.0), np.array([0.5, 1, 2, 20, np.inf, 3])

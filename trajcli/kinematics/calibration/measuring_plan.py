@@ -133,10 +133,9 @@ def measuring_plan(
     seen = identifiability(rows.reshape(-1, len(parameters)), parameters, length)
     _check_counts(count, candidates, rows.shape[1], seen, part)
     chosen = _chosen((rows.reshape(-1, len(parameters)) @ seen.basis).reshape(*rows.shape[:2], -1), count)
-    units = units_of(parameters, length)
-    scaled = rows[chosen].reshape(-1, len(parameters)) * units
-    values = np.linalg.svd(scaled, compute_uv=False)[: seen.rank]
-    final = identifiability(rows[chosen].reshape(-1, len(parameters)), parameters, length)
+    jacobian = rows[chosen].reshape(-1, len(parameters))
+    final = identifiability(jacobian, parameters, length)
+    values = np.linalg.svd(jacobian * units_of(parameters, length), compute_uv=False)[: final.rank]
     smallest = float(values[-1])
     index = float(np.exp(np.log(values).mean()) / np.sqrt(count))
     return MeasuringPlan(chosen, final, index, smallest, float(values[0]) / smallest)

@@ -151,7 +151,7 @@ def _size(around: ZoneAround, curve: PiecewisePolynomial) -> tuple[str, int | No
         ):
             if size is not None:
                 rows.append((name, None, size, values))
-    for joint, size in enumerate(zone.joints or ()):
+    for joint, size in enumerate(around.joint_sizes.tolist() if zone.joints else ()):
         rows.append(("joints", joint, size, np.abs(ends[:, joint] - around.corner[joint])))
     shares = np.max([values / size for _, _, size, values in rows], axis=0)
     nearer = int(shares.argmin())
@@ -166,8 +166,7 @@ def nearest_time(around: ZoneAround, curve: PiecewisePolynomial) -> float:
         joints = curve.evaluate(times)
         if around.robot.convention is not None:
             return around.offsets(joints)[0]
-        sizes = 1.0 if around.zone.joints is None else np.array(around.zone.joints)
-        return np.asarray(np.linalg.norm((joints - around.corner) / sizes, axis=1))
+        return np.asarray(np.linalg.norm((joints - around.corner) / around.joint_sizes, axis=1))
 
     low, high = curve.start, curve.end
     for _ in range(4):
