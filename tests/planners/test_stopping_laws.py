@@ -17,7 +17,7 @@ from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.flying_by import flown_parts as looked_for
 from trajcli.planners.flying_by import motion_search
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
-from trajcli.planners.flying_by.chain_parts import PathPart
+from trajcli.planners.flying_by.chain_parts import BorderNode, PathPart
 from trajcli.planners.flying_by.flown_parts import (
     CourseLaws,
     NoLawError,
@@ -318,3 +318,14 @@ def test_a_calmer_state_that_costs_too_much_is_left(monkeypatch):
         else:
             with pytest.raises(NoLawError):
                 search._flown(row, found)
+
+
+def test_a_state_with_an_acceleration_where_only_speeds_count_is_rounded_to_one_without() -> None:
+    """Without a limit of jerk no acceleration is kept: dividing it by the grid of none overflowed, aloud."""
+
+    def bounds(states):
+        return np.tile([-1e-6, 1e-6, -4.0, 4.0, -np.inf, np.inf], (len(states), 1))
+
+    speed, change = BorderNode(bounds, leads=True, goes_on=False).rounded(np.array([1e-7, 3.0]))
+    assert speed == pytest.approx(1e-7, rel=1e-6)
+    assert change == 0.0

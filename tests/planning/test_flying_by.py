@@ -207,6 +207,20 @@ def test_moves_that_go_straight_on_are_one_move(zone):
     assert duration(*three[1:], zone=zone) == pytest.approx(whole, rel=1e-9)
 
 
+@pytest.mark.parametrize("velocity", [0.0, 0.1])
+@pytest.mark.parametrize("far", [0.3, 3.0])
+def test_lines_that_go_straight_on_are_one_move_whichever_parameter_they_have(far, velocity):
+    """A straight line of time_optimal is by its length, one of jerk_limited by its share: 0.4 is no end of 1."""
+    line = {"planner": "time_optimal", "path": "polyline"}
+    fields = {"robot": {"joints": 2}, "limits": {"velocity": 1, "acceleration": 4, "jerk": 40}}
+    fields |= {"zone": {"joints": [0.05, 0.05]}, "start": {"joints": [0, 0], "velocity": [velocity] * 2}}
+    along = {"synchronize": "phase"}
+    want = duration(to(far, far, **along), to(2 * far, 2 * far), to(2 * far, 0), **fields)
+    for first, second in itertools.product((along, line), ({}, line)):
+        moves = to(far, far, **first), to(2 * far, 2 * far, **second), to(2 * far, 0)
+        assert duration(*moves, **fields) == pytest.approx(want, rel=1e-9)
+
+
 def test_a_larger_zone_is_never_slower():
     found = [duration(zone=zone) for zone in (0.0, 1e-4, 0.003, 0.01, 0.03, 0.1, 0.3)]
     assert all(b <= a * (1 + 1e-4) for a, b in itertools.pairwise(found))

@@ -99,7 +99,7 @@ class BorderNode:
 
     def rounded(self, state: Array) -> Array:
         """Return a state (2,) rounded to a part of the bounds: last bits of processors do not show."""
-        grid = _GRID * np.maximum(self._sizes, np.finfo(np.float64).tiny)
+        grid = np.maximum(_GRID * np.array(self._sizes), 1e-200)  # a bound may be zero
         return np.asarray(self.inside((np.round(state / grid) * grid)[None])[0])
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.operations import cut, times_at
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
@@ -53,14 +53,12 @@ class StraightenedChain:
         return parts
 
     def _cut(self, part: FlownPart, first: int, last: int) -> list[FlownPart]:
-        ends = _shares_of_line(self.chain.courses[first : last + 1])
         law, rest, parts = part.law, part.curve, []
         if law is None:
             return [part]
-        corners = self.chain.corners[first:last]
-        for k, corner in enumerate(corners):
-            lengths = np.diff(ends)[k : k + 2]
-            borders = ends[k] + corner.left * lengths[0], ends[k + 1] + corner.joined * lengths[1]
+        for k in range(first, last):
+            sides = (k, self.chain.corners[k].left), (k + 1, self.chain.corners[k].joined)
+            borders = [_on_line(self.chain, (first, last), *side) for side in sides]
             for time in times_at(law, np.array(borders)).tolist():
                 before, rest = cut(rest, time)
                 parts.append(FlownPart(before.shifted(-before.start)))
@@ -91,8 +89,7 @@ def straightened(chain: FlyByChain) -> StraightenedChain:
         min([*chain.tempos[first : last + 1], *(corner.pace for corner in chain.corners[first:last])])
         for first, last in groups
     ]
-    first_share = _shares_of_line(chain.courses[slice(groups[0][0], groups[0][1] + 1)])[1]
-    ends = chain.ends[0] * first_share, chain.ends[1]
+    ends = chain.ends[0] * _on_line(chain, groups[0], 0, 1.0), chain.ends[1]  # by how much ds grows
     joined = FlyByChain(tuple(courses), tuple(corners), ends, tuple(tempos))
     return StraightenedChain(chain, joined, tuple(groups))
 
@@ -111,7 +108,7 @@ def _goes_on(before: Course, behind: Course) -> bool:
 
 def _shares_of_line(courses: Sequence[Course]) -> Array:
     """Return where on the line that several make each begins, and 1, (k + 1,)."""
-    lengths = [float(np.linalg.norm(course.curve.coefficients[0, 0])) for course in courses]
+    lengths = [float(np.linalg.norm(course.curve.coefficients[0, 0])) * course.length for course in courses]
     shares = np.concatenate([[0.0], np.cumsum(lengths)])
     return np.asarray(shares / shares[-1])
 
@@ -119,8 +116,8 @@ def _shares_of_line(courses: Sequence[Course]) -> Array:
 def _line(courses: Sequence[Course]) -> Course:
     if len(courses) == 1:
         return courses[0]
-    ends: list[PiecewisePolynomial] = [courses[0].curve, courses[-1].curve]
-    return joint_line(ends[0].evaluate(0.0), ends[1].evaluate(1.0), courses[0].robot)
+    last = courses[-1].curve
+    return joint_line(courses[0].curve.evaluate(0.0), last.evaluate(last.end), courses[0].robot)
 
 
 def _on_line(chain: FlyByChain, group: tuple[int, int], course: int, s: float) -> float:
@@ -130,4 +127,4 @@ def _on_line(chain: FlyByChain, group: tuple[int, int], course: int, s: float) -
         return s
     shares = _shares_of_line(chain.courses[first : last + 1])
     low, high = shares[course - first], shares[course - first + 1]
-    return float(low + s * (high - low))
+    return float(low + s / chain.courses[course].length * (high - low))
