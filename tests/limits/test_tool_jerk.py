@@ -96,6 +96,17 @@ def test_acceleration_that_steps_breaks_it(key: str) -> None:
     assert findings[0].value == pytest.approx(99 * (LEVER if key == "jerk" else 1) * 1, rel=1e-9)
 
 
+@pytest.mark.parametrize(("beside", "steps"), [(0.0, False), (1e-8, True)])
+def test_a_joint_whose_axis_the_tool_is_on_does_not_move_it(beside: float, steps: bool) -> None:
+    """The axis is oblique, so that rounding leaves 1e-17 m/s^2 of the step at the tool."""
+    joints = [{"a": 0.3, "alpha": 1.1}, {"d": 0.1, "a": beside}]
+    job = link(
+        {"jerk": 100.0}, {"planner": "cubic", "to": {"joints": [0.7, 1.0]}}, start={"joints": [0.7, 0.0]}
+    )
+    found = plan_job(loaded({**job, "robot": {"convention": "standard", "joints": joints}})).verdict.findings
+    assert ["tool_acceleration_jump"] * steps == [finding.kind for finding in found]
+
+
 def test_a_step_belongs_to_the_move_with_the_acceleration() -> None:
     still = {"planner": "hold", "duration": 0.5}
     job = link({"jerk": 500.0}, {"planner": "trapezoid"})

@@ -17,6 +17,7 @@ from trajcli.limits.tool_bound import ToolPeak, tool_bounds
 from trajcli.trajectory import State, Trajectory
 
 SMOOTH = "a planner or a law whose acceleration does not step"
+_LEVER = 1e-12  # m, or of an axis: what rounding makes of a joint that does not move the tool
 _SMOOTH_HINT = f"use {SMOOTH}, or leave the limit of the tool's {{words}} out"
 
 
@@ -209,7 +210,7 @@ def _steps(move: LimitedMove, robot: Robot) -> Iterator[ToolStep]:
     limited = {kind.dimension for kind in TOOL_KINDS if kind.order == 3 and kind.stated(robot.limits)}
     for kind in (kind for kind in TOOL_KINDS if kind.order == 2 and kind.dimension in limited):
         size = sizes[:, int(kind.dimension == "angle")]
-        if size.max() > 0.0:
+        if size.max() > _LEVER * np.abs(change).max():
             worst = int(size.argmax())
             yield ToolStep(kind, float(size[worst]), float(breaks[worst]) - move.span.start)
 
