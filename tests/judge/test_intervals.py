@@ -88,6 +88,63 @@ def test_jumps_are_those_at_the_two_nearest_rows_on_either_side(seed: int) -> No
             np.testing.assert_allclose(jumps[piece], near.max(axis=0), rtol=1e-9)
 
 
+@pytest.mark.parametrize("orders", [2, 3])
+def test_pairs_of_rows_are_joined_by_what_both_state(orders: int) -> None:
+    """Their values and derivatives at both ends, and the rounding of each by joint: none but that of a double."""
+    window, rng = window_of(6), np.random.default_rng(orders)
+    stated, off = (
+        rng.normal(size=(orders, 2, ROWS - 1, JOINTS)) * 10.0 ** rng.integers(-6, 6),
+        np.array([1e-3, 0.0]),
+    )
+    fields = {name: getattr(window, name) for name in window.__dataclass_fields__}
+    fields["resolution"] = Resolution(0.0, off, off, off)
+    pairs = JoinedPairs(**fields, stated=stated, moves_after=window.moves[:-1], begun=window.t[:-1])
+    for piece in range(ROWS - 1):
+        for joint in range(JOINTS):
+            curve = np.poly1d(pairs.coefficients[:, piece, joint])
+            size = np.abs(stated[:, :, piece, joint]).max()
+            for order in range(orders):
+                ends = (
+                    [curve.deriv(order)(at) for at in (0.0, window.lengths[piece])]
+                    if order
+                    else [curve(at) for at in (0.0, window.lengths[piece])]
+                )
+                np.testing.assert_allclose(ends, stated[order, :, piece, joint], rtol=1e-6, atol=1e-9 * size)
+    for joint in range(JOINTS):
+        rows = pairs.piece_rows(np.arange(ROWS - 1), np.full(ROWS - 1, joint), orders)
+        np.testing.assert_array_equal((rows.length, rows.late), (window.lengths, window.late))
+        np.testing.assert_array_equal(rows.ends, stated[..., joint])
+        largest = np.abs(stated[..., joint]).max(axis=1)
+        np.testing.assert_allclose(rows.errors, off[joint] + 4.0 * np.spacing(largest), rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_jumps_beside_two_pieces_are_those_at_their_three_rows(seed: int) -> None:
+    window = window_of(seed)
+    q, qd, _ = window.states
+    short = replace(window, t=window.t[:3], lengths=window.lengths[:2], states=(q[:3], qd[:3], None))
+    one, other = (
+        CubicHermiteSpline(window.t[k : k + 2], q[k : k + 2], qd[k : k + 2], extrapolate=True) for k in (0, 1)
+    )
+    for order, jumps in zip((2, 3), short.jumps, strict=True):
+        at_rows = np.abs(one.derivative(order)(short.t) - other.derivative(order)(short.t))
+        np.testing.assert_allclose(jumps, [at_rows.max(axis=0)] * 2, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.99, "exceeded"), (1.01, "satisfied")])
+def test_the_jerk_of_a_spline_through_positions_is_judged(share: float, verdict: str) -> None:
+    """From rest to rest in a cubic: 12 d / T^3 all the time (Biagiotti and Melchiorri 2008, section 2.1.4)."""
+    nothing = np.zeros(1)
+    rows = RecordedMotion(
+        *(np.array([0.0, 2.0]), np.array([[0.1], [0.4]]), None, None, None, None, None, None),
+        Resolution(0.0, nothing, nothing, nothing),
+        "rows",
+    )
+    limits = replace(unlimited(1), jerk=np.array([[-1.0, 1.0]]) * share * 12 * 0.3 / 2.0**3)
+    required = Requirements(bare_robot(limits), interpolate="jtc-upsampling")
+    assert judge_motion(lambda: [rows], required).verdict == verdict
+
+
 @pytest.mark.parametrize("joint", range(JOINTS))
 def test_the_rows_of_a_piece_have_the_larger_rounding_of_both_of_its_joint(joint: int) -> None:
     """Half a unit of its own column, and a share of the larger of both numbers."""

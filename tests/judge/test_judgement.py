@@ -9,6 +9,7 @@ import pytest
 
 from trajcli.findings import Finding
 from trajcli.judge.judgement import Judgement, as_joined, as_planned, worst_first
+from trajcli.limits.tolerances import JOINED_RELATIVE
 
 
 def finding(value: float = 2.0, **fields: Any) -> Finding:
@@ -69,6 +70,47 @@ def test_what_joined_rows_of_a_verified_motion_pass_is_a_warning_and_an_event(
 def test_rows_of_a_verified_motion_have_no_jumps_whatever_their_rate(rule: str) -> None:
     assert planned(finding(rule=rule)).findings == ()
     assert planned(finding(rule=rule, severity="warning")).findings != ()
+
+
+def test_of_rows_of_a_verified_motion_what_is_further_beyond_its_limit_comes_first() -> None:
+    """Whether it was an error or a warning before."""
+    error, warning = finding(2.0, rule="limit"), finding(3.0, rule="limit", severity="warning")
+    assert [each.value for each in planned(error, warning).findings] == [3.0, 2.0]
+
+
+@pytest.mark.parametrize(("beyond", "told"), [(2.0, True), (0.5, False)])
+def test_joined_rows_may_be_so_far_above_a_limit(beyond: float, told: bool) -> None:
+    found = finding(1 + beyond * JOINED_RELATIVE, rule="limit")
+    judgement = as_planned(Judgement((found,), "cubic", 9))
+    assert (len(judgement.findings), len(judgement.events)) == (told, told)
+    assert as_joined(Judgement((found,), "cubic", 9)).planned_rows is True
+
+
+def test_a_judgement_says_in_json_what_it_knows() -> None:
+    bare = Judgement((), "linear", 3).as_json()
+    assert bare == {
+        "verdict": "satisfied",
+        "findings": [],
+        "interpolation": "linear",
+        "rows": 3,
+        "notes": [],
+        "events": [],
+    }
+    whole = Judgement(
+        (finding(rounding=0.25),),
+        "cubic",
+        3,
+        0.01,
+        None,
+        ("n",),
+        ("e",),
+        planned_rows=False,
+        planned_with="--for x",
+    ).as_json()
+    (one,) = whole.pop("findings")
+    assert (one["rounding"], one["value"], one["limit"], one["joint"]) == (0.25, 2.0, 1.0, "j1")
+    said = {"period": 0.01, "planned_rows": False, "planned_with": "--for x", "notes": ["n"], "events": ["e"]}
+    assert whole == {"verdict": "exceeded", "interpolation": "cubic", "rows": 3, **said}
 
 
 def test_what_rounding_explains_of_a_verified_motion_is_nothing() -> None:

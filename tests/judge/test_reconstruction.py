@@ -52,6 +52,18 @@ def test_curves_are_what_the_controller_runs(count: int, asked: str | None) -> N
         assert np.abs(curve.evaluate(times, order) - run[order]).max() < 1e-9 * np.abs(run[order]).max()
 
 
+@pytest.mark.parametrize(("asked", "orders"), [("linear", 1), ("cubic", 2), ("quintic", 3)])
+def test_columns_beyond_what_is_asked_for_are_not_looked_at(asked: str, orders: int) -> None:
+    """Both ends of each piece are as stated, by polynomials of least degree."""
+    q, qd, qdd = states(3)
+    curve = reconstruct(motion(q, qd, qdd), asked)
+    assert curve.coefficients.shape[0] == 2 * orders
+    for order, values in enumerate((q, qd, qdd)[:orders]):
+        for side, rows in (("right", slice(0, -1)), ("left", slice(1, None))):
+            found = curve.evaluate(TIMES[rows], order, side=side)
+            np.testing.assert_allclose(found, values[rows], atol=1e-9)
+
+
 def test_the_controller_decides_segment_by_segment() -> None:
     q, qd, qdd = states(2)
     qdd[1] = np.nan  # cubic beside it

@@ -17,7 +17,7 @@ from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import Payload, ToolLimits, unlimited
+from trajcli.kinematics.robot import Joint, Payload, ToolLimits, unlimited
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import plan_job
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
@@ -94,6 +94,53 @@ def test_a_velocity_that_rounding_does_not_explain(share, end, row, kind, joint,
     (one,) = found
     assert (one.kind, one.joint, one.quantity, one.value) == (kind, f"j{joint + 1}", "velocity", by)
     assert (one.severity, one.certainty) == ("error" if end else "warning", "exceeded")
+
+
+def test_messages_of_ends_name_joint_number_unit_and_time() -> None:
+    """A slide among turning joints: m, m/s and m/s^2, within its own tolerance."""
+    robot = bare_robot(unlimited(3))
+    robot = replace(robot, joints=(robot.joints[0], Joint("lift", "prismatic"), robot.joints[2]))
+    rows = replace(motion(), t=5.0 + T, qdd=np.zeros((4, 3)))
+    for row in (0, -1):
+        rows = moved(moved(rows, "q", row, 1, 0.01), "qd", row, 1, 0.25)
+    rows = moved(rows, "qdd", -1, 1, 0.5)
+    states = [State(each, np.zeros(3), np.zeros(3)) for each in (START, END)]
+    required = Requirements(robot, start=states[0], start_tolerance=TOLERANCE, end=states[1])
+    found = [each for each in judge_motion(lambda: [rows], required).findings if each.rule == "state"]
+    for each in found:
+        assert each.rounding == pytest.approx(OFF[1] + (each.quantity != "position") * 1e-6, rel=1e-6)
+    assert {(each.text(), each.time) for each in found} == {
+        ("the first row has lift at -0.19 m at t = 5 s, expected -0.2 m within 0.002 m", 5.0),
+        ("the first row has a velocity of lift of 0.25 m/s at t = 5 s, expected 0 m/s", 5.0),
+        ("the last row has lift at 0.51 m at t = 7.4 s, expected 0.5 m within 0.002 m", 7.4),
+        ("the last row has a velocity of lift of 0.25 m/s at t = 7.4 s, expected 0 m/s", 7.4),
+        ("the last row has an acceleration of lift of 0.5 m/s^2 at t = 7.4 s, expected 0 m/s^2", 7.4),
+    }
+    (turned,) = states_of(moved(motion(), "q", 0, 2, 0.01))
+    assert turned.text().endswith("has j3 at 0.31 rad at t = 0 s, expected 0.3 rad within 0.003 rad")
+
+
+@pytest.mark.parametrize("row", [0, -1])
+def test_a_row_that_states_no_velocity_is_at_none_that_is_wrong(row: int) -> None:
+    """As controllers take it, whatever other joints have: a row states what all of its joints have."""
+    for joints in (slice(0, 3), slice(0, 1)):
+        rows = moved(motion(), "qd", row, 1, 0.5)
+        rows.qd[row, joints] = np.nan
+        states = [State(each, np.zeros(3), np.zeros(3)) for each in (START, END)]
+        required = Requirements(
+            robot=bare_robot(unlimited(3)),
+            start=states[0],
+            start_tolerance=TOLERANCE,
+            end=states[1],
+            interpolate="jtc",
+        )
+        assert judge_motion(lambda rows=rows: [rows], required).findings == ()
+
+
+def test_a_wrong_stamp_is_one_of_its_move() -> None:
+    rows = replace(motion(), t=np.array([0.0, 0.7, 1.9, 1.8]), move=np.array([0, 0, 1, 1]))
+    (found,) = [each for each in judged(rows).findings if each.kind == "time"]
+    assert (found.move, found.row) == (1, 4)
 
 
 @pytest.mark.parametrize("name", ["q", "qd"])
