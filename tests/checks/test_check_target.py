@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from motions import between, limits, trajectory
@@ -67,6 +69,46 @@ def test_a_mutant_that_ends_beside_its_pose():
     assert turned.value == pytest.approx(turn, rel=1e-6)
     assert {finding.kind for finding in (beside, turned)} == {"target"}
     assert len(check_targets(swing(mutant), to_pose(pose_target(pose), (1e-6, 2e-3)))) == 1
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("share", "count"), [(0.99, 1), (1.01, 0)])
+@pytest.mark.parametrize("turns", [True, False])
+def test_the_tool_may_be_beside_and_turned_by_so_much(
+    turns: bool, share: float, count: int, side: float
+) -> None:
+    """Each by its own tolerance, in its own unit: the last joint turns the tool in its place."""
+    off, wide = 1e-4, (9.0, 1.0)
+    mutant, pose = END.copy(), forward(ROBOT, END)
+    if turns:
+        mutant[5] += side * off
+    else:
+        pose[2, 3] += side * off
+    tolerance = (wide[0], share * off) if turns else (share * off, wide[1])
+    found = check_targets(swing(mutant), to_pose(pose_target(pose), tolerance))
+    assert len(found) == count
+    for each in found:
+        assert (each.value, each.limit) == (pytest.approx(off, rel=1e-6), pytest.approx(share * off))
+        said = "ends turned by 0.0001 rad from its" if turns else "ends 0.0001 m beside its"
+        assert said in each.text()
+        assert each.text().endswith("promised were 9.9e-05 rad" if turns else "promised were 9.9e-05 m")
+
+
+def test_each_move_ends_in_its_target_with_the_tool_that_it_has() -> None:
+    """A tool is changed between moves: what another one would meet does not count."""
+    whole, targets = three_moves(3, np.zeros(6))
+    arms = []
+    for k in range(3):
+        tool = ROBOT.tool.copy()
+        tool[0, 3] += 0.1 * k
+        arms.append(replace(ROBOT, tool=tool))
+    promises = [
+        Promise(robot=arm, destination=Destination(None, pose_target(forward(arm, each))))
+        for arm, each in zip(arms, targets, strict=True)
+    ]
+    assert check_targets(whole, promises) == []
+    changed = [replace(each, robot=arms[(k + 1) % 3]) for k, each in enumerate(promises)]
+    assert {each.move for each in check_targets(whole, changed)} == {0, 1, 2}
 
 
 def test_what_a_target_leaves_free_does_not_count():
