@@ -42,6 +42,7 @@ AXES = [
     (0.0, 0.0, -1.0),
     (0.6, 0.0, 0.8),
     (-0.48, 0.6, 0.64),
+    (1e-4, 0.0, (1.0 - 1e-8) ** 0.5),
 ]
 COUNT = 50
 
@@ -169,6 +170,29 @@ def test_what_stands_on_the_axis_is_free_and_noted() -> None:
     np.testing.assert_allclose(np.broadcast_to(turn[1], (2, 3))[:, 1], 0.0)
 
 
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_what_stands_as_near_to_the_axis_as_its_scale_says_is_free(scale: float) -> None:
+    """A point on the axis divides nothing by zero; 1.1e-8 of the scale beside it is a place to turn about."""
+    noted, beside = flags(3), scale * np.array([0.0, 0.9e-8, 1.1e-8])
+    vector = (beside, 0.0 * beside, scale + 0.0 * beside)
+    with np.errstate(all="raise"):
+        turn, _ = levels((0.0, 0.0, 1.0), vector, (1.0, 0.0, 0.0), 0.0 * beside, noted, scale)
+    assert noted.rows.tolist() == [True, True, False]
+    np.testing.assert_allclose(np.broadcast_to(turn[0], (2, 3))[:, :2], 1.0)
+    np.testing.assert_allclose(np.asarray(turn[1])[:, 2], [1.0, -1.0])
+
+
+def test_each_choice_of_a_pose_has_an_axis_of_its_own() -> None:
+    """The last choice comes first: of two that are made of poses alone the second one leaves room for the first."""
+    noted, poses = flags(5), np.arange(5.0)
+    first = noted.fork((poses, poses), (poses, poses))
+    second = noted.fork((poses, poses), (1.0 + poses, poses))
+    assert [each.shape for each in (*first, *second)] == [(2, 5), (2, 5), (2, 1, 5), (2, 1, 5)]
+    assert noted.both(poses).shape == (2, 1, 1, 5)
+    assert noted.choices == 3
+    np.testing.assert_array_equal(second[0][:, 0], [2 * poses + 1.0, -np.ones(5)])
+
+
 def whole(value) -> tuple[np.ndarray, np.ndarray]:
     return value.both() if isinstance(value, Mirrored | Opposed) else value
 
@@ -187,6 +211,8 @@ def whole(value) -> tuple[np.ndarray, np.ndarray]:
         ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, -0.6, 0.8)),
         ((0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, 1.0, 0.0)),
         ((0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (0.0, 1.0, 0.0)),
+        ((0.0, 0.0, 1.0), (0.0, (1.0 - 1e-10) ** 0.5, 1e-5), (0.0, 0.6, 0.8)),  # almost at right angles
+        ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), ((1.0 - 1e-10) ** 0.5, 1e-5, 0.0)),
     ],
 )
 def test_both_pairs_of_turns_reach_the_aim(first, second, vector, sign: float) -> None:
@@ -207,6 +233,17 @@ def test_both_pairs_of_turns_reach_the_aim(first, second, vector, sign: float) -
     stands = rotated(second, bend[0], np.array(vector))
     assert (sign * np.cross(first, stands) @ second >= -1e-9).all()
     assert not noted.rows.any()
+
+
+def test_a_right_angle_that_was_typed_with_ten_digits_is_one() -> None:
+    """A wrist bent by 3e-8 rad still says how it turns, as it does at a right angle; at 1e-8 it would not."""
+    first, second, vector = (0.0, 0.0, 1.0), (0.0, 1.0, 5e-10), (0.0, 0.0, 1.0)
+    angles, noted = np.linspace(-3.0, 3.0, COUNT), flags()
+    aims = rotated(first, angles, rotated((0.0, 1.0, 0.0), np.full(COUNT, 3e-8), np.array(vector)))
+    around, _ = two_turns(first, second, vector, columns(aims), noted)
+    assert not noted.rows.any()
+    found = np.broadcast_to(angles_of(whole(around)), (2, COUNT))
+    np.testing.assert_allclose(np.abs(np.exp(1j * found) - np.exp(1j * angles)).min(axis=0), 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", [Mirrored, Opposed])
