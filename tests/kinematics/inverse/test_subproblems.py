@@ -236,14 +236,14 @@ def test_both_pairs_of_turns_reach_the_aim(first, second, vector, sign: float) -
 
 
 def test_a_right_angle_that_was_typed_with_ten_digits_is_one() -> None:
-    """A wrist bent by 3e-8 rad still says how it turns, as it does at a right angle; at 1e-8 it would not."""
+    """A wrist bent by 3e-8 rad still says how it turns, to the share of that by which the angle is none."""
     first, second, vector = (0.0, 0.0, 1.0), (0.0, 1.0, 5e-10), (0.0, 0.0, 1.0)
     angles, noted = np.linspace(-3.0, 3.0, COUNT), flags()
     aims = rotated(first, angles, rotated((0.0, 1.0, 0.0), np.full(COUNT, 3e-8), np.array(vector)))
     around, _ = two_turns(first, second, vector, columns(aims), noted)
     assert not noted.rows.any()
     found = np.broadcast_to(angles_of(whole(around)), (2, COUNT))
-    np.testing.assert_allclose(np.abs(np.exp(1j * found) - np.exp(1j * angles)).min(axis=0), 0.0, atol=1e-6)
+    np.testing.assert_allclose(np.abs(np.exp(1j * found) - np.exp(1j * angles)).min(axis=0), 0.0, atol=5e-10 / 3e-8)
 
 
 @pytest.mark.parametrize("kind", [Mirrored, Opposed])
