@@ -76,6 +76,7 @@ def segment(**fields):
     return {"planner": "path", "corner": "stop", "segments": ends, **fields}
 
 
+QUARTER = {"center": [0.4, 0.15, 0.05], "axis": "z", "to": {"xyz": [0.45, 0.15, 0.05]}}
 TWO = [{"line": {"xyz": [0.4, 0.3, 0.05]}}, {"line": {"xyz": [0.5, 0.3, 0.05]}}]
 WRONG = {
     "moving end": (line({**TO, "velocity": 0.1}), "line ends at rest", 2),
@@ -105,6 +106,11 @@ WRONG = {
     ),
     "tangent in place": (line({"rpy": DOWN}, orientation="tangent"), "tangent", 3),
     "tangent and a target's": (line(orientation="tangent"), "follows from the path", 3),
+    "tangent and that of the start, behind a bend": (
+        {"planner": "arc", **QUARTER, "to": {**QUARTER["to"], "rpy": DOWN}, "orientation": "tangent"},
+        "follows from the path",
+        3,
+    ),
     "screw of a place": (
         {"planner": "screw", "to": {"xyz": [0.4, 0.2, 0.1], "yaw": 1, "tool_axis": "x"}},
         "a screw needs the whole",
@@ -236,3 +242,15 @@ def test_a_joints_limit_is_named_with_its_place():
     worst = np.abs(free.trajectory.curve.evaluate(times_of(free, 2001))[:, 0]).max()
     assert worst > 0.2
     assert f"{worst:.4f}"[:5] in str(error)
+
+
+def test_a_tangent_ends_where_the_path_turns_it_to():
+    """The target that leaves its orientation out, and a line to one that asks for that of the start."""
+    arc = {"planner": "arc", **QUARTER, "orientation": "tangent"}
+    ends = [
+        plan("ur5e", START, move).moves[0].planned.end.position for move in (arc, {**arc, "axis": [0, 0, -1]})
+    ]
+    straight = {"planner": "line", "to": {"xyz": TO["xyz"], "rpy": DOWN}, "orientation": "tangent"}
+    ends.append(plan("ur5e", START, straight).moves[0].planned.end.position)
+    turned = forward(arm("ur5e"), np.array(ends))[:, :3, 0]  # the x axis of the tool
+    np.testing.assert_allclose(turned @ turned[2], [0.0, 0.0, 1.0], atol=1e-5)  # by 90 and by -270 degrees

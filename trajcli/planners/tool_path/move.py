@@ -341,6 +341,7 @@ class ToolTarget:
         turn: Change of yaw or pitch on the path, rad; zero for other kinds.
         joints: Joint values (n,) that the target imposes; None where it is a pose.
         typed: The three angles (3,) that give the target, their sequence and frame; None if others do.
+        kept: Whether the target says nothing of the orientation.
     """
 
     pose: Array
@@ -350,11 +351,12 @@ class ToolTarget:
     turn: float = 0.0
     joints: Array | None = None
     typed: tuple[Array, str, str] | None = None
+    kept: bool = False
 
 
 def kept_orientation(pose: Array, robot: Robot) -> ToolTarget:
     """Return the target of a pose with the orientation of before: free on an arm of less than six joints."""
-    return ToolTarget(pose, _WHOLE, "all" if len(robot.joints) >= _ALL_SIX else "none")
+    return ToolTarget(pose, _WHOLE, "all" if len(robot.joints) >= _ALL_SIX else "none", kept=True)
 
 
 def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
@@ -430,13 +432,15 @@ def orientation_along(
             raise PlanningError(message, hint="leave the target's orientation out, or use axis_angle")
         return FixedOrientation(start, 0.0 if progress is None else progress.length)
     if how == "tangent":
-        if turns > _SAME:
-            message = "orientation: tangent follows from the path, but the target asks for an orientation"
-            raise PlanningError(message, hint="leave the target's orientation out, or use axis_angle")
         if position is None:
             message = "orientation: tangent needs a path, and the tool stays in its place"
             raise PlanningError(message, hint="use axis_angle")
-        return TangentOrientation(position, start)
+        tangent = TangentOrientation(position, start)
+        ends = tangent.evaluate(np.array([tangent.length]), "left")[0][0]
+        if turns > _SAME or not (targets[-1].kept or np.abs(ends - rotations[-1]).max() <= _SAME):
+            message = "orientation: tangent follows from the path, but the target asks for an orientation"
+            raise PlanningError(message, hint="leave the target's orientation out, or use axis_angle")
+        return tangent
     if how == "euler":
         return _even_in_angles(rotations, targets, progress, origin)
     if progress is None:
