@@ -149,3 +149,14 @@ def test_a_last_row_with_a_beta_is_searched_for() -> None:
     solutions = solve(robot, pose_target(forward(robot, q)), q)
     assert (solutions.method.family, method_for(OTHER).family) == ("numeric", "joint 7 held")
     np.testing.assert_allclose(solutions.joints[solutions.nearest(q)], q, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("joints", [[3], [1, 3], [0, 2, 3]])
+@pytest.mark.parametrize("end", [0, 1])
+def test_where_the_arm_stands_is_the_nearest_answer_whichever_joints_are_at_their_ends(
+    joints: list[int], end: int
+) -> None:
+    q = np.array([0.3, 0.4, 0.2, -1.2, 0.0, 0.0, 0.0])
+    q[joints] = PANDA.limits.position[joints, end]
+    solutions = solve(PANDA, pose_target(forward(PANDA, q)), q)
+    np.testing.assert_allclose(solutions.joints[solutions.nearest(q)], q, rtol=0, atol=1e-9)

@@ -137,7 +137,7 @@ class _Samples:
         usable = np.isfinite(costs[0] + costs[1] + costs[2]) & (apart < _ALIKE)
         safe = np.where(usable, costs, beside**2)
         bend = safe[0] - 2.0 * safe[1] + safe[2]
-        usable &= bend > 0.0
+        usable &= (bend > 0.0) & (safe[1] > _LAST**2)
         bend = np.where(usable, bend, 1.0)
         u = np.where(usable, np.clip(0.5 * (safe[0] - safe[2]) / bend, -1.0, 1.0), 0.0)
         point = here + 0.5 * u * (above - below) + 0.5 * u * u * (above - 2.0 * here + below)
