@@ -12,11 +12,13 @@ from conventions import screw
 from trajcli.geometry.pose import build
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
+from trajcli.kinematics.carriage import on_carriage
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import pose_target
 from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Joint, Limits
 
 CONVENTIONS = pytest.mark.parametrize("convention", ["standard", "modified"])
 
@@ -82,6 +84,21 @@ def test_inverse_kinematics_of_a_calibrated_arm_is_numeric_and_exact():
     np.testing.assert_allclose(solutions.joints[solutions.nearest(q)], q, rtol=0, atol=1e-9)
     for joints in solutions.joints[solutions.valid]:
         np.testing.assert_allclose(by_the_book(calibrated, joints), pose, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.3, -0.7, 0.2)])
+@CONVENTIONS
+def test_an_arm_on_a_rail_stands_there_as_it_does_without_its_betas_included(convention, axis):
+    """A modified row begins with its tilt: that of the first joint is then between the rail and that joint."""
+    rng = np.random.default_rng(5)
+    robot = tilted(rng, 3, convention, (0.3, 0.6, 0.9))
+    mount = screw(0.2, 0.4) @ about_y(-0.7)
+    one = np.array([[-1.0, 1.0]])
+    whole = on_carriage(robot, np.array(axis), Joint("rail", "prismatic"), Limits(one, one, one, one), mount)
+    q, along = rng.uniform(-2, 2, 3), 0.6
+    expected = mount @ by_the_book(replace(robot, base=np.eye(4)), q)
+    expected[:3, 3] += along * np.array(axis) / np.linalg.norm(axis)
+    np.testing.assert_allclose(by_the_book(whole, [along, *q]), expected, rtol=0, atol=1e-12)
 
 
 JOB = """

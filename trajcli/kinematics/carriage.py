@@ -15,6 +15,7 @@ from math import atan2
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.kinematics.dh_rows import row_pose
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
 
 _PARALLEL = 1e-12  # of a unit vector: a lift
@@ -31,12 +32,12 @@ def on_carriage(arm: Robot, axis: Array, slide: Joint, bounds: Limits, mount: Ar
         mount: Where the arm stands when the slide is at zero, in the frame of the base, (4, 4).
     """
     first, modified = arm.joints[0], arm.convention == "modified"
-    frame = mount @ _turn_x(first.alpha, first.a) if modified else mount
+    frame = mount @ row_pose((0.0, 0.0, first.a, first.alpha, first.beta)) if modified else mount
     foot, alpha, turn = _foot(axis / np.linalg.norm(axis), frame)
     rail = replace(slide, alpha=0.0 if modified else alpha)
     turned = replace(first, theta=first.theta + turn)
     if modified:
-        turned = replace(turned, alpha=alpha, a=0.0)
+        turned = replace(turned, alpha=alpha, a=0.0, beta=0.0)
     return replace(
         arm,
         joints=(rail, turned, *arm.joints[1:]),
@@ -54,13 +55,8 @@ def _foot(axis: Array, frame: Array) -> tuple[Array, float, float]:
     x = frame[:3, 0] if sine <= _PARALLEL else across / sine
     foot[:3, :3] = np.column_stack([x, np.cross(axis, x), axis])
     alpha = atan2(0.0 if sine <= _PARALLEL else sine, along)
-    left = _turn_x(-alpha, 0.0)[:3, :3] @ foot[:3, :3].T @ frame[:3, :3]
+    left = row_pose((0.0, 0.0, 0.0, -alpha, 0.0))[:3, :3] @ foot[:3, :3].T @ frame[:3, :3]
     return foot, alpha, 0.0 if sine <= _PARALLEL else atan2(float(left[1, 0]), float(left[0, 0]))
-
-
-def _turn_x(alpha: float, a: float) -> Array:
-    c, s = np.cos(alpha), np.sin(alpha)
-    return np.array([[1.0, 0.0, 0.0, a], [0.0, c, -s, 0.0], [0.0, s, c, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
 def _stacked(first: Limits, others: Limits) -> Limits:
