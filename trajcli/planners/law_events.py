@@ -34,7 +34,7 @@ def distance_from_bound(motion: TimeOptimalMotion, robot: Robot, stretch: float 
         return Event("bound", "nothing is known of the fastest possible along this path")
     above = 100.0 * max(motion.law.duration * stretch / motion.lower_bound - 1.0, 0.0)
     digit = 10.0 ** (math.floor(math.log10(above)) - 1) if above > _NEXT_TO_NOTHING else _NEXT_TO_NOTHING
-    text = f"at most {math.ceil(above / digit) * digit:.2g} % above the fastest possible along this path: "
+    text = f"at most {math.ceil(above / digit) * digit:.9g} % above the fastest possible along this path: "
     joint = getattr(motion, "bounding_joint", None)
     amounts: Amounts = {"bound": Amount(motion.lower_bound, rounded="down")}
     if getattr(motion, "bounded_by_stops", False):

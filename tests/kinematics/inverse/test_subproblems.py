@@ -243,7 +243,9 @@ def test_a_right_angle_that_was_typed_with_ten_digits_is_one() -> None:
     around, _ = two_turns(first, second, vector, columns(aims), noted)
     assert not noted.rows.any()
     found = np.broadcast_to(angles_of(whole(around)), (2, COUNT))
-    np.testing.assert_allclose(np.abs(np.exp(1j * found) - np.exp(1j * angles)).min(axis=0), 0.0, atol=5e-10 / 3e-8)
+    np.testing.assert_allclose(
+        np.abs(np.exp(1j * found) - np.exp(1j * angles)).min(axis=0), 0.0, atol=5e-10 / 3e-8
+    )
 
 
 @pytest.mark.parametrize("kind", [Mirrored, Opposed])

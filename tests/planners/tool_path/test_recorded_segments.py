@@ -10,6 +10,7 @@ from trajcli.errors import FileError, TrajcliError
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.forward import forward
+from trajcli.planners.tool_path.segments import merged_events
 from trajcli.planning.plan import plan_job
 
 START = [0.4, 0.1, 0.3]
@@ -74,7 +75,13 @@ def test_a_file_is_the_lines_to_its_poses(tmp_path):
     made = planned(tmp_path, HEADER + rows(), {"csv": "poses.csv"})
     same_motion(made, planned(tmp_path, HEADER, written(AROUND[1:], TILTS[1:])))
     assert [e.kind for e in made.moves[0].planned.events] == ["merged"]
-    assert made.moves[0].planned.events[0].message.startswith("segment 2 counts for nothing")
+    said = made.moves[0].planned.events[0].message
+    assert said == "segment 2 counts for nothing: it ends where it begins"
+    merged = merged_events(6, [0, 2, 4])
+    assert [each.message for each in merged] == [
+        "segment 1 counts for nothing: it ends where it begins; 2 more likewise"
+    ]
+    assert merged_events(2, [0, 1]) == []
 
 
 def test_lengths_may_be_in_mm_and_the_first_row_somewhere_else(tmp_path):

@@ -18,6 +18,7 @@ from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.errors import PlanningError
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.planners import joint_course
+from trajcli.planners.law_events import distance_from_bound
 from trajcli.planners.waypoints import fastest_law
 from trajcli.planners.waypoints.fastest_law import (
     events_of_law,
@@ -251,3 +252,12 @@ def test_a_stretch_by_more_than_a_thousandth_is_told(stretch: float, conceded: b
 )
 def test_of_many_stops_the_first_ten_are_listed(count: int, text: str) -> None:
     assert text in told(stops=np.arange(count), stop_times=np.arange(float(count)))["stops"]
+
+
+@pytest.mark.parametrize(("lower", "said"), [(0.999, "0.11"), (0.75, "34"), (0.4, "150"), (0.009, "12000")])
+def test_how_far_above_its_bound_a_law_is_has_two_digits_rounded_up_and_no_exponent(
+    lower: float, said: str
+) -> None:
+    motion: Any = SimpleNamespace(lower_bound=lower, law=SimpleNamespace(duration=1.0))
+    text = distance_from_bound(motion, robot(1)).message
+    assert text.startswith(f"at most {said} % above")

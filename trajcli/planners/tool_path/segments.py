@@ -249,9 +249,11 @@ def _stays(segment: Segment, pose: Array, robot: Robot) -> bool:
 def merged_events(count: int, kept: Sequence[int]) -> list[Event]:
     """Return the event of segments without a length that were left out."""
     left = sorted({*range(count)} - {*kept})
-    some = "segment {}" if len(left) == 1 else f"{len(left)} segments, the first is {{}}:"
-    message = "counts for nothing: it ends where it begins"
-    return [Event("merged", f"{some.format(left[0])} {message}")] if left else []
+    if not left:
+        return []
+    message = f"segment {left[0]} counts for nothing: it ends where it begins"
+    more = f"; {len(left) - 1} more likewise" if len(left) > 1 else ""
+    return [Event("merged", message + more)]
 
 
 def _in_segment(index: int, problem: Problem) -> Problem:
