@@ -222,22 +222,26 @@ def test_robust_losses_ignore_outliers(loss):
     assert fit.outliers == tuple(sorted(spoilt))
 
 
-def test_the_cost_is_that_of_scipys_least_squares():
+@pytest.mark.parametrize("weighted", [True, False])
+def test_the_cost_is_that_of_scipys_least_squares(weighted):
     robot, rng = arm("scara"), np.random.default_rng(12)
     parameters = parse_parameters(robot, "j1.a,j2.theta,j2.a,j3.d,tool.x")
     measurements = measured(
         robot, configurations(robot, 25, rng), true_changes(robot, rng), rng, position=2e-3, angle=2e-2
     )
-    options = Options(0.3)
+    options, scales = Options(0.3), np.tile([1.0, 0.3], (25, 1))
+    if weighted:  # each measurement by its own deviations
+        scales = 10.0 ** rng.uniform(-1, 1, (25, 2))
+        measurements = replace(measurements, deviations=1.0 / scales)
     fit = calibrate(robot, measurements, parameters, options)
     poses = measurements.kinds[0].target.poses
 
     def residual(change):
         rows = []
-        for q, pose in zip(measurements.joints, poses, strict=True):
+        for q, pose, scale in zip(measurements.joints, poses, scales, strict=True):
             mine = pose_of(robot, q, dict(zip(parameters, change, strict=True)))
             turn = Rotation.from_matrix(pose[:3, :3] @ mine[:3, :3].T).as_rotvec()
-            rows += [pose[:3, 3] - mine[:3, 3], 0.3 * turn]
+            rows += [scale[0] * (pose[:3, 3] - mine[:3, 3]), scale[1] * turn]
         return np.concatenate(rows)
 
     peer = least_squares(residual, np.zeros(len(parameters)), xtol=1e-15, ftol=1e-15, gtol=1e-15)
@@ -276,6 +280,31 @@ def test_a_robust_fit_is_where_the_sum_of_its_loss_is_least(loss, seed):
         assert here < min(below, above)
         offset = 0.5 * (above - below) / (above - 2 * here + below)  # of the least one, by a parabola
         assert abs(offset) * 1e-4 < 2e-6
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_an_outlier_keeps_no_combination_from_being_released(loss):
+    """What only the calibrated arm tells is found where a robust loss leaves one measurement out."""
+    case = CASES["A-2.4-cal3R"]
+    robot, given, expected = case_robot(case), case["inputs"], case["expected"]
+    q, poses = np.array(given["q"]), np.array(given["measured_T"])
+    poses[0, :3, 3] += 0.05
+    measurements = Measurements(q, (MeasuredKind(np.arange(len(q)), pose_target(poses)),))
+    text = ",".join(f"j{i}.{name}" for i in (1, 2, 3) for name in ("theta", "d", "a", "alpha"))
+    fit = calibrate(robot, measurements, parse_parameters(robot, text), Options(1.0, loss))
+    assert (fit.released, fit.outliers, fit.converged) == (1, (0,), True)
+    np.testing.assert_allclose(forward(fit.robot, np.array(given["q_test"])), expected["T_test"], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [6, 12, 19])
+def test_what_noise_alone_explains_a_little_is_not_released(seed):
+    """Seeds with which two combinations take away three times the variance each, as one fit in ten does."""
+    robot, rng = arm("ur"), np.random.default_rng(seed)
+    text = ",".join(f"j{i}.{name}" for i in range(2, 5) for name in ("theta", "d", "a", "alpha"))
+    parameters = parse_parameters(robot, text)
+    changes = {p: rng.normal() * 3e-2 for p in parameters if p.angular}
+    fit = calibrate(robot, measured(robot, configurations(robot, 20, rng), changes, rng), parameters, LINEAR)
+    assert (fit.nominal.rank, fit.released) == (10, 0)
 
 
 def test_far_from_nominal():
