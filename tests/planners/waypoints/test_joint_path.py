@@ -156,6 +156,92 @@ def test_a_quintic_at_rest_leaves_its_ends_along_its_chords() -> None:
     assert path.speeds == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("parameter", "wanted"),
+    [
+        ("chord", [0.0, 5.0, 18.0, 18.25]),
+        ("centripetal", np.cumsum([0.0, 5.0**0.5, 13.0**0.5, 0.5])),
+        ("uniform", [0.0, 1.0, 2.0, 3.0]),
+        ((0.0, 0.5, 3.0, 3.5), [0.0, 0.5, 3.0, 3.5]),
+    ],
+)
+def test_the_parameter_grows_with_distances_their_roots_or_points(parameter: object, wanted: object) -> None:
+    """Between points that are 5, 13 and 1/4 apart."""
+    points = table(np.cumsum([[0, 0], [3, -4], [5, 12], [-0.25, 0]], axis=0))
+    np.testing.assert_allclose(
+        spline_through("not_a_knot", parameter, points, robot(2)).s, wanted, rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("count", [2, 4])
+def test_a_parameter_has_one_value_for_each_point(count: int) -> None:
+    with pytest.raises(PlanningError, match=f"{count} values of the parameter for 3 points"):
+        spline_through("not_a_knot", tuple(range(count)), table([[0, 0], [1, 2], [2, 1]]), robot(2))
+
+
+def test_of_a_velocity_that_no_monotone_path_has_the_joint_is_named() -> None:
+    points = table([[0.0, 0.0], [1.0, 0.1], [2.0, 1.0]], first=[0.1, 3.0])
+    with pytest.raises(PlanningError) as caught:
+        spline_through("shape_preserving", "chord", points, robot(2))
+    (problem,) = caught.value.problems
+    assert problem.joint == "j2"
+    assert "the velocity of j2 at the first point" in problem.text()
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_points_beside_one_where_all_joints_turn_back_are_bent_as_the_rule_says(first: bool) -> None:
+    """One in three turns back, among chords of unequal lengths: it alone has the acceleration of its parabola."""
+    q = np.array([[0.0, 0.0], [1.0, 0.5], [0.7, 0.1], [0.6, -0.2], [-1.0, -0.4], [-3.0, -0.5]])
+    turn, points = (1, table(q)) if first else (4, table(q[::-1]))
+    points.given[1, [0, -1]] = True  # at rest, without an acceleration
+    path = spline_through("quintic", "chord", points, robot(2))
+    slopes = np.diff(points.positions, axis=0) / np.diff(path.s)[:, None]
+    rates = np.zeros_like(points.rates)
+    rates[0, [0, -1]] = slopes[[0, -1]]
+    plain = curve_through("quintic", replace(points, rates=rates), path.s)
+    for k in range(6):
+        bent = path.curve.evaluate(path.s[k], 2, side="left" if k == 5 else "right")
+        if k == turn:
+            around = slice(k - 1, k + 2)
+            wanted = [
+                2 * np.polyfit(path.s[around] - path.s[k], column[around], 2)[0]
+                for column in points.positions.T
+            ]
+        else:
+            wanted = plain.evaluate(path.s[k], 2, side="left" if k == 5 else "right")
+        np.testing.assert_allclose(bent, wanted, rtol=1e-9, atol=1e-9)
+    assert np.abs(plain.evaluate(path.s[2 if first else 3], 2)).max() > 1e-3
+
+
+def test_a_path_that_turns_back_twice_stops_twice_and_says_where() -> None:
+    path = polyline([[0, 0], [1, 0], [1, 1], [1, 0], [2, 0], [1.5, 0]], 0.05, smooth=False)
+    stops = [event.message for event in path.events if event.kind == "turns_back"]
+    assert stops == [f"the path turns back at point {k}, and stops there" for k in (2, 4)]
+    np.testing.assert_allclose(path.curve.evaluate(path.s[[2, 4]]), [[1, 1], [2, 0]], atol=1e-12)
+    np.testing.assert_allclose(path.missed[[1, 3]].max(axis=1), 0.05, rtol=1e-9)
+    passed = np.abs(path.curve.evaluate(path.s) - [[0, 0], [1, 0], [1, 1], [1, 0], [2, 0], [1.5, 0]])
+    np.testing.assert_allclose(path.missed, passed, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e3])
+def test_a_velocity_leaves_a_polyline_by_a_share_of_itself(size: float) -> None:
+    """A slow one as well as a fast one; the joint that leaves it is named."""
+    with pytest.raises(PlanningError) as caught:
+        polyline(ENDS, 0.1, first=[0.5 * size, 5e-7 * size])
+    (problem,) = caught.value.problems
+    assert problem.joint == "j2"
+    speeds = polyline(ENDS, 0.1, first=[0.5 * size, 4e-10 * size]).speeds
+    assert speeds == (pytest.approx(0.5 * size), 0.0)
+
+
+@pytest.mark.parametrize(("length", "told"), [(1.3, True), (1.7, False)])
+def test_a_corner_that_is_rounded_by_a_part_of_what_is_asked_for_is_told(length: float, told: bool) -> None:
+    """Parabolas pass a right angle by an eighth of their length: of segments of 1.3 and 1.7, at most."""
+    path = polyline([[0, 0], [length, 0], [length, 3]], 0.2, smooth=False)
+    assert [event.kind for event in path.events] == ["shrunk"] * told
+    assert path.missed[1].max() == pytest.approx(min(0.999 * length / 8, 0.2))
+
+
 def test_of_a_motion_from_rest_to_rest_the_path_leaves_its_ends_with_a_slope() -> None:
     """q = 10 u^3 - 15 u^4 + 6 u^5: over the third power of time it has a slope of 10 at rest, there as here."""
     from trajcli.curves.piecewise import PiecewisePolynomial
