@@ -93,6 +93,90 @@ def test_every_joint_and_point_that_cannot_be_is_told() -> None:
     assert len(flaws({(1, 0): (2.5, None)})) == 1
 
 
+def own_limits() -> Robot:
+    """Return two joints of which each has its own limits, and other ones by direction."""
+    limits = replace(
+        unlimited(2),
+        velocity=np.array([[-0.5, 0.7], [LOW, HIGH]]),
+        acceleration=np.array([[-1.0, 1.5], [-4.0, 3.0]]),
+        jerk=np.array([[-1000.0, 1000.0], list(JERK)]),
+    )
+    return replace(robot(), limits=limits)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ((-1.25, None), "j2 has velocity -1.25 at point 1, beyond its limit -1"),
+        ((2.25, None), "j2 has velocity 2.25 at point 1, beyond its limit 2"),
+        ((None, -4.5), "j2 has acceleration -4.5 at point 1, beyond its limit -4"),
+        # a |a| / (2 j), of 3 and 10: 0.45
+        ((1.75, 3.0), "must move at 2.2 just after, beyond its velocity limit 2"),
+        ((-0.75, 3.0), "must move at -1.2 just before, beyond its velocity limit -1"),
+        ((-0.75, -3.0), "must move at -1.2 just after, beyond its velocity limit -1"),
+    ],
+)
+def test_what_cannot_be_is_told_with_the_limit_of_its_joint_and_direction(
+    given: tuple[float | None, float | None], said: str
+) -> None:
+    with pytest.raises(PlanningError) as caught:
+        require_possible(points(THREE, {(1, 1): given}), own_limits())
+    (problem,) = caught.value.problems
+    assert said in problem.text()
+
+
+@pytest.mark.parametrize("given", [(1.5, 3.0), (-0.5, 3.0), (1.5, None), (None, 3.0), (None, -4.0)])
+def test_what_can_be_within_the_limits_of_its_joint_is_taken(
+    given: tuple[float | None, float | None],
+) -> None:
+    """Where one of both is left open it is found so that it fits: 4^2 / 20 of -1 would be left of it."""
+    require_possible(points(THREE, {(1, 1): given, (1, 0): (0.6, 1.5)}), own_limits())
+    tight = replace(own_limits(), limits=replace(own_limits().limits, jerk=np.full((2, 2), 5.0) * [-1, 1]))
+    if None in given:
+        require_possible(points(THREE, {(1, 1): given}), tight)
+
+
+def test_a_limit_of_many_digits_is_told_towards_the_inside() -> None:
+    limit = np.radians(-100.0)
+    arm = robot(velocity=(limit, 2.0))
+    with pytest.raises(PlanningError) as caught:
+        require_possible(points(THREE, {(1, 1): (limit * 1.001, None)}), arm)
+    told = float(caught.value.problems[0].text().split("its limit ")[1].split()[0])
+    assert limit <= told <= limit * (1 - 1e-3)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("point", [0, 1, 2])
+def test_a_joint_moves_where_anything_of_it_does(point: int, order: int) -> None:
+    """It may come back to where it was: by a velocity or an acceleration at any of its points."""
+    still = [[0.0, 0.3], [1.0, 0.3], [2.0, 0.3]]
+    assert points(still, {}).moving.tolist() == [True, False]
+    given = (0.5, None) if order == 0 else (None, 0.5)
+    assert points(still, {(point, 1): given}).moving.tolist() == [True, True]
+    assert points([[0.0, 0.3], [1.0, 0.4], [0.0, 0.3]], {}).moving.tolist() == [True, True]
+
+
+def test_a_start_that_is_the_target_leaves_nothing_out() -> None:
+    both = without_repeats(points([[0.1, 0.2], [0.1, 0.2]], {}), robot())
+    assert (len(both.positions), both.events) == (2, ())
+
+
+def test_points_in_one_place_that_differ_are_told_with_their_numbers_and_place() -> None:
+    """The place is that of the later one, and of those that stay the last one's."""
+    given = points(
+        [[0.0, 0.0], [1.0, 1.0], [1.0, 1.0], [2.0, 2.0]], {(1, 1): (0.25, 0.5), (2, 1): (0.25, 0.75)}
+    )
+    placed = replace(given, fields=(None, ("through", 0), ("through", 1), ("to",)))
+    with pytest.raises(PlanningError) as caught:
+        without_repeats(placed, robot())
+    (problem,) = caught.value.problems
+    assert problem.text() == "two points in one place give j2 different accelerations, 0.5 and 0.75"
+    assert problem.field == ("through", 1)
+    assert [problem.amounts[name].order for name in ("one", "other")] == [2, 2]
+    same = replace(placed, states=np.where(placed.states == 0.75, 0.5, placed.states))
+    assert without_repeats(same, robot()).fields == (None, ("through", 1), ("to",))
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_points_are_in_one_place_where_all_joints_are(sign: float) -> None:
     near = 0.5 * SAME_POSITION
