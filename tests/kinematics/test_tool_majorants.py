@@ -92,6 +92,26 @@ def test_a_slide_is_as_long_a_lever_as_it_goes(sign: int) -> None:
     assert 1.0 <= position[1, 0] / np.hypot(v, w * v * LENGTH) <= 1.2
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_each_piece_is_bounded_by_the_lever_that_it_begins_with(sign: int) -> None:
+    """Steady turns about slides that stand at 0.1, 2 and 0.5 m: d w^k / k!."""
+    joints = Joint("turn", alpha=-np.pi / 2), Joint("slide", "prismatic")
+    arm = Robot("turning slide", joints, unlimited(2), "standard", np.eye(4), np.eye(4))
+    out, w = np.array([0.1, 2.0, 0.5]), sign * np.array([3.0, 1.0, -2.0])
+    start = np.stack([np.array([0.3, -1.1, 2.0]), out], axis=1)
+    coefficients = np.stack([np.stack([w, np.zeros(3)], axis=1), start])
+    position, _ = majorants(arm, start, growth(coefficients, np.full(3, LENGTH), ORDER))
+    for k in range(1, ORDER + 1):
+        np.testing.assert_allclose(position[k], out * np.abs(w) ** k / factorial(k), rtol=1e-9)
+
+
+def test_every_coefficient_of_a_slide_counts() -> None:
+    slide = Robot("slide", (Joint("slide", "prismatic"),), unlimited(1), "standard", np.eye(4), np.eye(4))
+    coefficients = np.ones((ORDER + 1, 1, 1))
+    position, _ = majorants(slide, np.ones((1, 1)), growth(coefficients, np.array([LENGTH]), ORDER))
+    np.testing.assert_allclose(position[1:, 0], shifted(coefficients, LENGTH)[1:, 0], rtol=1e-12)
+
+
 def test_a_planar_arm_is_a_sum_of_exponentials() -> None:
     """p = 0.3 exp(i q1) + 0.2 exp(i (q1 + q2)); w = q1' + q2'."""
     for _ in range(5):
@@ -106,10 +126,12 @@ def test_a_planar_arm_is_a_sum_of_exponentials() -> None:
             assert (w <= spin[:-1] * (1 + 1e-12)).all()
 
 
-def test_a_steady_turn_is_bounded_tightly() -> None:
-    """Of p = a exp(i r t) the bounds are the derivatives: a r^k / k!, and w = r."""
+@pytest.mark.parametrize("start", [0.0, 0.7, -2.3])
+def test_a_steady_turn_is_bounded_tightly(start: float) -> None:
+    """Of p = a exp(i r t) the bounds are the derivatives: a r^k / k!, and w = r, wherever it begins."""
     coefficients = np.zeros((2, 1, 2))
     coefficients[0, 0, 0] = rate = 3.0
+    coefficients[1, 0, 0] = start
     position, spin = bounds("planar2r", coefficients)
     reach = sum(joint.a for joint in load_robot("planar2r").joints)
     np.testing.assert_allclose(
