@@ -98,6 +98,17 @@ def test_twice_the_time_for_limits_of_slower_joints():
     assert slow == pytest.approx(2 * fast, rel=1e-6)
 
 
+@pytest.mark.parametrize("size", [1e4, 1e9, 1e12])
+def test_limits_that_are_never_reached_do_not_matter(size):
+    """The law without limits of jerk, from which the search begins, is up to half a million times too fast."""
+    path = spline(np.linspace(0, 1, 5), np.random.default_rng(0).uniform(-2, 2, (5, 2)))
+    near, far, jerk = (both(np.full(2, each)) for each in (60.0, size, 10.0))
+    slowest = judged(path, near, near, jerk).law.duration
+    motion = judged(path, far, far, jerk)
+    assert motion.law.duration == pytest.approx(slowest, rel=3e-3)
+    assert motion.stretch < 1.01
+
+
 def test_every_corner_is_a_stop_between_motions_from_rest_to_rest():
     points = np.array([[0.0, 0.0], [1.0, 0.2], [0.3, 1.0], [0.3, 1.5]])
     bounds = both([1.0, 1.2]), both([5.0, 4.0]), both([60.0, 50.0])

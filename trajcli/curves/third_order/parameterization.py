@@ -32,6 +32,7 @@ from trajcli.curves.turning_bound import bound_between_stops
 from trajcli.frozen import frozen
 
 _FIRST_GAP = 1e-3  # of the duration: what the first step may miss
+_FAR = 30.0  # times as long as it is: a first law that has to last so long is slowed down before any step
 _FIRST_STEPS, _MORE_STEPS = 12, 6  # on the first nodes and on the last ones
 _CHANGED = 3e-4  # of the duration: a step that changes less is the last one
 _STEADY = 0.7  # of the change before: a step that changes more leads nowhere
@@ -178,6 +179,8 @@ class _Search:
         self.lowered = np.ones((3, law.lengths.size))
         self.best, self.stretch = law, np.inf
         self._take(law)
+        if rests and self.stretch > _FAR:
+            self._take(law.slowed(self.stretch))
 
     def refine(self, most: int, hopeless: float) -> float:
         """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
