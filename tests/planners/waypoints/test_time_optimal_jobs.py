@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from through_jobs import assert_joins, cases, curve_of, job_text, plan, refusal
 
+import trajcli
+from trajcli.errors import PlanningError
 from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
 from trajcli.planners.planner import stretched
@@ -311,3 +313,33 @@ def test_wrong_input_is_one_clear_error(fields, message, code, limits):
     assert message in error.problems[0].text()
     assert error.problems[0].place is not None
     assert error.exit_code == code
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"planner": "time_optimal", "parameter": [0, 1, 2, 3]},
+        {"planner": "blends", "blend_durations": [0.1, 0.1, 0.1, 0.1]},
+    ],
+)
+def test_a_list_with_a_value_for_a_repeated_point_says_how_it_is_taken(fields):
+    """The repeated point counts for nothing: its value has none, and the advice, followed, is a plan."""
+    (name, values) = list(fields.items())[1]
+
+    def job(points, values):
+        move = {**fields, name: values, "through": [{"joints": q} for q in points]}
+        limits = {"velocity": 1, "acceleration": 4}
+        return {
+            "version": 1,
+            "robot": {"joints": 2},
+            "limits": limits,
+            "start": {"joints": [0, 0]},
+            "moves": [move],
+        }
+
+    points = [[0.5, 0.2], [0.5, 0.2], [1.0, 0.0]]
+    with pytest.raises(PlanningError) as caught:
+        trajcli.plan(job(points, values))
+    assert "4 " in str(caught.value)
+    assert "none twice" in caught.value.problems[0].hint
+    assert trajcli.plan(job(points[1:], values[:3])).verdict.passed

@@ -262,7 +262,7 @@ class Blends(ThroughPoints):
             return None
         if isinstance(self.blend_durations, tuple) and len(self.blend_durations) != points.count:
             message = f"{len(self.blend_durations)} durations of blends for {points.count} points"
-            raise PlanningError(message, hint="give one for each point, or one number for all")
+            raise PlanningError(message, hint="give one for each point, none twice, or one number for all")
         durations = np.broadcast_to(np.array(self.blend_durations), (points.count,))
         return np.where(points.blends > 0, points.blends, durations)
 

@@ -109,7 +109,7 @@ def _parameter_values(parameter: Parameter, points: PointTable) -> Array:
     if isinstance(parameter, tuple):
         if len(parameter) != points.count:
             message = f"{len(parameter)} values of the parameter for {points.count} points"
-            raise PlanningError(message, hint="give one for each point, or use chord")
+            raise PlanningError(message, hint="give one for each point, none twice, or use chord")
         return np.array(parameter)
     chords = np.linalg.norm(np.diff(points.positions, axis=0), axis=1)
     steps = {"chord": chords, "centripetal": np.sqrt(chords), "uniform": np.ones_like(chords)}[parameter]
