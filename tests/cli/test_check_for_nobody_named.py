@@ -144,3 +144,15 @@ def test_a_slower_motion_is_recognised_where_its_consumer_is_named(
     assert found["planned_with"] == "--for ur-servoj --set when_over_limit=slow"
     other = call(capfd, "check", str(file), "--job", str(job), "--for", "ur-passthrough", "--json")
     assert json.loads(other.out)["planned_rows"] is False
+
+
+def test_rows_that_a_job_asks_for_its_consumer_are_recognised_where_that_is_named_again(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """`plan --for` takes other columns than the job asks for, and would write others."""
+    job, file = tmp_path / "job.yaml", tmp_path / "rows.csv"
+    output = "output: {for: ur-servoj, columns: [t, q, move]}\n"
+    job.write_text(STEPPING.replace("moves:", f"{output}moves:"), encoding="utf-8")
+    assert call(capfd, "plan", str(job), "-o", str(file)).code == 0
+    outcome = call(capfd, "check", str(file), "--job", str(job), "--for", "ur-servoj", "--json")
+    assert (outcome.code, json.loads(outcome.out)["planned_rows"]) == (0, True)

@@ -84,6 +84,7 @@ def asked_for(calls: list[str | None]) -> Delivered:
         ("", "ros-jtc", ["ros-jtc"]),
         ("ur-servoj", None, [None]),  # the one that the job names
         ("ur-servoj", "ros-jtc", ["ros-jtc"]),
+        ("ros-jtc", "ros-jtc", ["ros-jtc", None]),  # beside the option the job's own rows do not count
     ],
 )
 def test_of_two_consumers_that_are_named_that_of_the_option_counts(

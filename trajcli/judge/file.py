@@ -172,11 +172,15 @@ def _as_delivered(
     loaded = given.loaded
     if given.plan is None or loaded is None:
         return given, None
-    if (options.profile or loaded.job.output.consumer) is not None:
-        found = _made_for(source, given, options, delivered, (options.profile, loaded))
-        if found is not None or options.profile is None:
-            return found or given, None
-    elif (compared := _compared(source, given, options)) is None or compared.planned:
+    asked, of_job = [options.profile] if options.profile else [], loaded.job.output.consumer
+    if of_job and options.profile in (None, of_job):
+        asked.append(None)  # what the job says of its rows counts, as it does not beside `--for`
+    for name in asked:
+        if (found := _made_for(source, given, options, delivered, (name, loaded))) is not None:
+            return found, None
+    if options.profile is None and (
+        asked or (compared := _compared(source, given, options)) is None or compared.planned
+    ):
         return given, None
     from trajcli.judge.rows.rows_for_consumers import consumers_of
 
