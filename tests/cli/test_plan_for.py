@@ -107,6 +107,7 @@ def test_the_consumer_brings_its_rows(
         (["--for", "ur-servoj", "--rows", "knots"], "rate: 500", None),
         ([], "for: ur-servoj, rate: 125", 6),
         ([], "for: ur-servoj, rows: both", 6),
+        ([], "for: ur-servoj, times: [0, 0.3, 0.5]", 6),
         ([], "for: ur-servo", 6),
     ],
 )
@@ -132,6 +133,8 @@ def test_a_job_names_its_consumer(tmp_path: Path, capfd: pytest.CaptureFixture[s
     resolved = tmp_path / "resolved.yaml"
     assert call(capfd, "plan", bare, "--resolved", str(resolved), "--no-output")[0] == 0
     assert call(capfd, "plan", str(resolved))[:2] == (0, out)
+    listed = job(tmp_path, UR, "rate: 500", "for: ur-passthrough, times: [0, 0.3, 1]")
+    assert len(call(capfd, "plan", listed)[1].splitlines()) == 4
     own = job(tmp_path, UR, "rate: 500", "for: ur-servoj, columns: [t, q]")
     code, out, err = call(capfd, "plan", own)
     assert (code, out.splitlines()[0]) == (0, "t,q1,q2,q3,q4,q5,q6")

@@ -172,7 +172,8 @@ def _as_delivered(
     loaded = given.loaded
     if given.plan is None or loaded is None:
         return given, None
-    asked, of_job = [options.profile] if options.profile else [], loaded.job.output.consumer
+    asked: list[str | None] = [options.profile] if options.profile else []
+    of_job = loaded.job.output.consumer
     if of_job and options.profile in (None, of_job):
         asked.append(None)  # what the job says of its rows counts, as it does not beside `--for`
     for name in asked:

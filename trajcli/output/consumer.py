@@ -45,13 +45,14 @@ def job_for(loaded: LoadedJob, name: str | None, kept: Mapping[str, bool]) -> tu
         raise error if name else error.located(place=loaded.document.place(("output", "for"))) from None
     wanted, given = profile.rows, output.model_fields_set
     stays = {key: kept.get(key, False) if name else key in given for key in ("rate", "rows")}
+    stays["times"] = not name and output.times is not None
     changed: dict[str, Any] = {"consumer": profile.name}
     if wanted.rate is not None:
         _refuse_other_rows(loaded, profile, stays)
         changed |= {"rate": wanted.rate, "times": None, "rows": "rate"}
     elif name and not stays["rows"]:
         changed["rows"] = None
-    if wanted.align and (name or "align" not in given):
+    if wanted.align and (name or ("align" not in given and not stays["times"])):
         changed |= {"align": True, "times": None}
     if name or "columns" not in given:
         changed["columns"] = wanted.columns
@@ -68,6 +69,8 @@ def _refuse_other_rows(loaded: LoadedJob, profile: Profile, stays: Mapping[str, 
     wrong = ("rate", f"{output.rate:g} Hz") if stays["rate"] and output.rate != rate else None
     if stays["rows"] and output.rows in ("knots", "both"):
         wrong = "rows", f"`rows: {output.rows}`"
+    if stays["times"]:
+        wrong = "times", "`times`"
     if wrong is not None:
         key, what = wrong
         text = f"{profile.name} takes rows at {rate:g} Hz, and {what} is asked for"
