@@ -109,6 +109,15 @@ def test_limits_that_are_never_reached_do_not_matter(size):
     assert motion.stretch < 1.01
 
 
+@pytest.mark.parametrize("make", [polyline, lambda points: spline(np.linspace(0, 1, 4), points)])
+def test_ramps_shorter_than_rounding_of_the_duration(make):
+    """A ramp of acceleration lasts 1e-12 s, the motion 1e9 s: no float64 tells when the ramp ends."""
+    path = make(np.random.default_rng(4).uniform(-2, 2, (4, 2)))
+    bounds = (both(np.full(2, size)) for size in (1e-9, 1e-3, 1e9))
+    motion = judged(path, *bounds)
+    assert motion.lower_bound <= motion.law.duration <= 1.1 * motion.lower_bound
+
+
 def test_every_corner_is_a_stop_between_motions_from_rest_to_rest():
     points = np.array([[0.0, 0.0], [1.0, 0.2], [0.3, 1.0], [0.3, 1.5]])
     bounds = both([1.0, 1.2]), both([5.0, 4.0]), both([60.0, 50.0])

@@ -16,7 +16,8 @@ from trajcli.frozen import frozen
 _NODES = 64  # over the whole path
 _FEWEST = 3  # of a piece of the path
 _MANY = 64  # breaks of a section between two stops: with more, a node at each is enough
-_WIDEST = 0.3  # of the duration of a section: a wider window would leave nothing of the law
+_NARROWEST = 1e-8  # of the duration of a section: rounding is all that a narrower window would show
+_WIDEST = 0.3  # likewise: a wider window would leave nothing of the law
 _SEARCHED = 8  # samples between two nodes, among which the times of breaks are looked up
 _NEWTON = 3  # steps after that
 _SLOWEST = 0.3  # of the speed at an end: an acceleration there is not followed to less
@@ -126,7 +127,7 @@ def smoothed_law(
         inner = path.breaks[(path.breaks > borders[k]) & (path.breaks < borders[k + 1])]
         breaks = np.concatenate([borders[k : k + 1], inner, borders[k + 1 : k + 2]])
         around = EndStates(ends.start if k == 0 else _REST, ends.end if k == last else _REST)
-        width = min(ramp, _WIDEST * law.duration)
+        width = min(max(ramp, _NARROWEST * law.duration), _WIDEST * law.duration)
         average = MovingAverage(law, width, (around.start[0], around.end[0]))
         count = max(_NODES * law.duration / second.law.duration, _FEWEST)
         states = _nodes(average, breaks, count, around)
