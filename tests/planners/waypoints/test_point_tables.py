@@ -12,6 +12,7 @@ from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.language.recorded import SAME_POSITION
+from trajcli.language.targets import Target
 from trajcli.planners.waypoints.through_points import PointTable, ThroughPoints
 from trajcli.trajectory import State, resting
 
@@ -36,7 +37,7 @@ def points(*times: float | None, **last: Any) -> list[dict[str, Any]]:
     return rows
 
 
-@pytest.mark.parametrize("off", [1e-6, -1e-6, 0.3, -0.3])
+@pytest.mark.parametrize("off", [4e-9, -4e-9, 1e-6, -1e-6, 0.3, -0.3])
 def test_a_duration_is_the_time_of_the_last_point_to_a_billionth(off: float) -> None:
     through = points(1.0, 2.0)
     assert "is not the duration" in str(
@@ -48,6 +49,7 @@ def test_a_duration_is_the_time_of_the_last_point_to_a_billionth(off: float) -> 
         )
     )
     assert table({"through": through, "duration": 2.0 + np.sign(off) * 1e-10}).count == 3
+    assert table({"through": points(1.0, 2000.0), "duration": 2000.0 + np.sign(off) * 1e-6}).count == 3
 
 
 @pytest.mark.parametrize(
@@ -114,6 +116,73 @@ def test_a_recording_that_begins_at_once_begins_where_the_arm_stands(first: list
     with pytest.raises(PlanningError, match="not where the arm then stands") as caught:
         table(move)
     assert caught.value.problems[0].amounts["joint"] == ("j1" if first[0] else "j2")
+
+
+def test_a_target_with_a_time_needs_points_with_times() -> None:
+    """None of them is passed over in silence."""
+    move = {"planner": "spline", "through": points(None, None), "to": {"joints": [3.0, 3.0], "time": 3.0}}
+    assert "has no `time`, others have" in str(refusal(ORIGIN, move))
+
+
+@pytest.mark.parametrize("listed", [True, False])
+def test_poses_become_joints_each_near_to_the_point_before_it(listed: bool) -> None:
+    """After a recording that is its last point; what else is said of a point stays with it."""
+    pose = {"xyz": [0.1, 0.2, 0.3], "rpy": [0.0, 0.0, 0.0]}
+    move: dict[str, Any] = {"planner": "blends", "blend_durations": 0.1}
+    if listed:
+        first = [point | {"blend": 0.125} for point in points(1.0, 2.0)]
+        move |= {"through": [*first, pose | {"time": 3.0, "blend": 0.25}, pose | {"time": 4.0, "blend": 0.5}]}
+    else:
+        recorded = {"positions": [[1.0, 0.0], [2.0, -1.0]], "times": [1.0, 2.0]}
+        move |= {"through": recorded, "to": pose | {"time": 3.0}}
+    nears: list[list[float]] = []
+
+    def resolve(point: Any, near: np.ndarray) -> Target:
+        if not point.gives_pose:
+            return cast("Target", point)
+        nears.append(near.tolist())
+        return Target(joints=(near + 1.0).tolist())
+
+    found = planner(move).with_joint_targets(resolve, np.array([9.0, 9.0]))
+    assert nears == ([[2.0, -1.0], [3.0, 0.0]] if listed else [[2.0, -1.0]])
+    last = found.listed[2:] if listed else found.listed
+    assert [point.as_state().position.tolist() for point in last] == [[3.0, 0.0], [4.0, 1.0]][: len(last)]
+    assert [point.time for point in last] == [3.0, 4.0][: len(last)]
+    filled = found.waypoints(resting(np.zeros(2)), ROBOT)
+    assert filled.blends.tolist() == ([0.0, 0.125, 0.125, 0.25, 0.5] if listed else [0.0] * 4)
+
+
+@pytest.mark.parametrize(("to", "name"), [(True, "target"), (False, "waypoint 1")])
+def test_a_pose_that_is_not_reached_is_named_by_its_place(to: bool, name: str) -> None:
+    pose = {"xyz": [0.1, 0.2, 0.3]}
+    last = {"to": pose} if to else {}
+    through = points(None) if to else [*points(None), pose]
+
+    def resolve(point: Any, near: np.ndarray) -> Target:
+        del near
+        if point.gives_pose:
+            raise PlanningError("out of reach")
+        return cast("Target", point)
+
+    move = planner({"planner": "time_optimal", "through": through, **last})
+    with pytest.raises(PlanningError, match=f"^{name}: out of reach"):
+        move.with_joint_targets(resolve, np.zeros(2))
+
+
+def test_a_recording_of_the_row_where_the_arm_stands_leaves_nothing_to_do() -> None:
+    with pytest.raises(PlanningError, match="the recording has one row, where the arm stands, at t = 0 s"):
+        table({"through": {"positions": [[0.0, 0.0]], "times": [0.0]}})
+
+
+def test_a_recording_that_begins_elsewhere_says_where_by_joint() -> None:
+    with pytest.raises(PlanningError) as caught:
+        table({"through": {"positions": [[0.0, -0.25], [2.0, -1.0]], "times": [0.0, 2.0]}})
+    amounts = caught.value.problems[0].amounts
+    assert [(amounts[key].value, amounts[key].joint) for key in ("there", "here", "distance")] == [
+        (-0.25, 1),
+        (0.0, 1),
+        (0.25, 1),
+    ]
 
 
 def test_what_is_given_goes_with_its_point() -> None:
