@@ -51,20 +51,24 @@ def test_each_row_is_what_one_limit_of_one_joint_leaves(seed):
         )
         np.testing.assert_allclose(rows.c - rows.a * sdd - rows.b * sd**2, left, rtol=1e-9, atol=1e-9)
     assert not constraint(robot, one.path, np.tile([-FREE, FREE], (4, 1))).bounds_sdd
+    assert (one.shortest(s).tolist(), one.largest(s, "left").tolist()) == ([0.0] * 4, [FREE] * 5)
 
 
 @pytest.mark.parametrize("order", [("left", "right"), ("right", "left"), ("left", "right", "left")])
-@pytest.mark.parametrize("kink", [0.5, 1e-5, 1e-9])
-def test_both_sides_of_a_break_have_their_own_rows(kink, order):
+@pytest.mark.parametrize(("kink", "far"), [(0.5, 0.0), (1e-5, 0.0), (1e-9, 0.0), (1e-9, 1e4)])
+def test_both_sides_of_a_break_have_their_own_rows(kink, far, order):
     """q'' jumps there; what one side was told is not what the other one is, however little it differs."""
     robot = random_arm(np.random.default_rng(1), 3)
     path, dynamics = curved(5, 3, kink), InverseDynamics(robot)
+    path = PiecewisePolynomial(
+        path.breaks, path.coefficients + far * np.array([0.0, 0.0, 1.0])[:, None, None]
+    )
     one = constraint(robot, path, np.tile([-900.0, 900.0], (3, 1)))
     q, first, second = path.evaluate_orders(np.array([1.0]), (0, 1, 2), side="left").transpose(1, 0, 2)
     for side in order:
         wanted = dynamics.rigid_effort(q, first, second * (1 + kink * (side == "right")), weight=False)
         rows = one.rows(np.array([0.5, 1.0, 1.5]), side)
-        np.testing.assert_allclose(rows.b[1, :3], wanted[0], rtol=1e-12)
+        np.testing.assert_allclose(rows.b[1, :3], wanted[0], rtol=1e-10 if far else 1e-12)
         np.testing.assert_array_equal(rows.b[:, 3:], -rows.b[:, :3])
 
 
@@ -141,6 +145,28 @@ def test_viscous_friction_that_helps_is_a_chord_up_to_the_largest_speed(velocity
             np.testing.assert_allclose(given[:, helped], left[:, helped], rtol=1e-12)
 
 
+@SIDES
+@pytest.mark.parametrize(
+    ("speed", "touches", "taken"), [(0.5, 0.5, 10.0), (1.5, 1.5, 30.0), (50.0, 2.0, 40.0)]
+)
+def test_viscous_friction_that_resists_is_a_tangent_that_leaves_half_at_rest(speed, touches, taken, side):
+    """It takes v r / 2 of 80 N at rest, of v = 40 N s/m at a speed r: at most half, which is that of 2 m/s.
+
+    At the speed at which it touches it is exact, and at no other speed too little.
+    """
+    robot = replace(lifts(1.0, viscous=40.0), gravity=np.zeros(3))
+    limits = np.tile([-80.0, 80.0], (2, 1))
+    one = constraint(robot, straight(side), limits, speed=lambda s: np.full(s.size, speed))
+    rows = one.rows(np.array([0.25, 0.5]), "right")
+    resisted = slice(0, 2) if side > 0 else slice(2, 4)
+    np.testing.assert_allclose(rows.c[:, resisted], 80.0 - taken, rtol=1e-12)
+    for sd in (0.0, 0.3, 1.0, 1.9, 2.5, 10.0, touches):
+        left = 80.0 - 40.0 * sd
+        given = (rows.c - rows.b * sd**2)[:, resisted]
+        assert (given <= left + 1e-9).all()
+    np.testing.assert_allclose(given, left, atol=1e-9)
+
+
 def test_viscous_friction_of_one_joint_is_some():
     robot = lifts(1.0)
     joints = robot.joints[0], replace(robot.joints[1], friction=Friction(0.0, 2.0))
@@ -188,6 +214,9 @@ def test_what_gravity_alone_exceeds_between_points_is_told_as_much_as_can_be(sid
     assert used(side, 40.0, 0.0, 0.5, side) == 1e3
     assert used(side, 40.0, -1.0, 0.5, side) == 1e3
     assert used(side, 40.0, -1.82, 0.5, side) == 0.0
+    held = abs(float(InverseDynamics(lifts(side)).gravity_effort([0.0, 0.0])[1]))
+    assert used(side, held, 0.0, 0.5, side) == 0.0  # just what it takes to stand
+    assert used(side, held + 1e-6, 4.0, 0.5, side) == 1e3  # of a millionth of a newton
 
 
 @SIDES
@@ -203,14 +232,18 @@ def test_each_interval_is_told_alone(piece, side):
     np.testing.assert_allclose(shares, wanted, atol=1e-9)
 
 
-def test_shares_are_those_of_efforts_at_both_ends_and_in_the_middle():
-    """Gravity of an arm changes on the way; what it takes at the near end counts as not there to be used."""
+@pytest.mark.parametrize("begins", [0.1, 1.0, 1.2])
+def test_shares_are_those_of_efforts_at_both_ends_and_in_the_middle(begins):
+    """Gravity of an arm changes on the way; what it takes at the near end counts as not there to be used.
+
+    The path breaks at 1, where q'' jumps.
+    """
     robot, times, worst = random_arm(np.random.default_rng(3), 3), np.array([0.0, 0.2, 0.4]), set()
-    dynamics, path = InverseDynamics(robot), curved(3, 3)
+    dynamics, path = InverseDynamics(robot), curved(3, 3, 0.5)
     for joint, sdd in np.ndindex(3, 5):
         limits = np.tile([-FREE, FREE], (3, 1))
         limits[joint, 1] = 1e4
-        law = np.array([[sdd - 2.0], [1.0], [0.1]])
+        law = np.array([[sdd - 2.0], [1.0], [begins]])
         s, sd = np.polyval(law[:, 0], times), 1.0 + 2.0 * law[0] * times
         q, first, second = path.evaluate_orders(s, (0, 1, 2)).transpose(1, 0, 2)
         efforts = dynamics.effort(q, first * sd[:, None], first * 2.0 * law[0] + second * sd[:, None] ** 2)
@@ -219,4 +252,4 @@ def test_shares_are_those_of_efforts_at_both_ends_and_in_the_middle():
         worst.add(int(shares.argmax()))
         found = constraint(robot, path, limits).excess(LawPieces(np.array([0.4]), law))
         np.testing.assert_allclose(found[1], max(shares.max(), 0.0), rtol=1e-9, atol=1e-12)
-    assert worst == {0, 1, 2}
+    assert len(worst) > 1
