@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from recorded_rows import judged
@@ -9,7 +11,7 @@ from scipy.interpolate import BPoly, PPoly
 from scipy.optimize import minimize_scalar
 from tiers import few
 
-from trajcli.kinematics.robot import Limits
+from trajcli.kinematics.robot import Limits, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 KINDS = ("position", "velocity", "acceleration", "jerk")
@@ -97,3 +99,24 @@ def test_the_judgement_is_that_of_dense_samples(seed: int) -> None:
 def test_the_judgement_is_that_of_dense_samples_at_length(block: int) -> None:
     for seed in range(100):
         test_the_judgement_is_that_of_dense_samples(1000 + 100 * block + seed)
+
+
+@pytest.mark.parametrize("seed", few(range(24)))
+def test_rows_at_a_period_of_many_digits_keep_limits_that_the_motion_has(seed: int) -> None:
+    """Stamps of six decimals say the period to some nanoseconds: what that makes of accelerations is rounding."""
+    random = np.random.default_rng(seed)
+    count, duration = int(random.integers(20, 300)), random.uniform(0.5, 3.0)
+    x = np.linspace(0.0, 1.0, count)
+    states = [10 * x**3 - 15 * x**4 + 6 * x**5, 30 * (x - x * x) ** 2, 60 * x * (1 - x) * (1 - 2 * x)]
+    rows = [np.round(values / duration**k, 9)[:, None] for k, values in enumerate(states)]
+    off = np.full(1, 0.5e-9)
+    t, resolution = np.round(duration * x, 6), Resolution(0.5e-6, off, off, off)
+    motion = RecordedMotion(t, *rows, None, None, None, None, resolution, "rows")
+    peaks = 15 / 8 / duration, 10 / 3**0.5 / duration**2, 60 / duration**3
+    for share, certain in ((1.0, False), (0.98, True)):
+        bounds = {
+            name: share * peak * np.array([[-1.0, 1.0]])
+            for name, peak in zip(("velocity", "acceleration", "jerk"), peaks, strict=True)
+        }
+        judgement = judged(motion, replace(unlimited(1), **bounds), interpolate="quintic")
+        assert (judgement.verdict == "exceeded") == certain

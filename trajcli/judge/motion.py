@@ -311,8 +311,10 @@ class MotionJudge:
         assert self._stamps is not None and self._resolution is not None  # noqa: S101, PT018
         lengths, late = np.diff(kept.t), kept.errors[:-1] + kept.errors[1:]
         if self._stamps.lattice is not None:
-            period = self._stamps.lattice.period
-            lengths = np.where(late == 0.0, np.rint(lengths / period) * period, lengths)
+            lattice, exact = self._stamps.lattice, late == 0.0
+            steps = np.rint(lengths / lattice.period)
+            lengths = np.where(exact, steps * lattice.period, lengths)
+            late = np.where(exact, steps * lattice.loose, late)
         return Intervals(
             t=kept.t,
             lengths=lengths,

@@ -277,3 +277,37 @@ def test_the_largest_move_of_a_stamp_is_remembered_either_way(late: float) -> No
     stamps = Stamps(half, 0.0)
     assert in_blocks(stamps, t, [50])[1].all()
     assert stamps.largest_snap == pytest.approx(abs(late) * half, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("period", "decimals", "count", "meant"),
+    [
+        (Fraction(1, 120), 6, 10, True),  # of whole hertz
+        (Fraction(2, 125), 9, 10, True),  # as it is written
+        (Fraction(1, 30), 3, 40, True),
+        (Fraction(2, 75), 6, 100, True),  # 37.5 Hz: there is no other fraction as simple
+        (Fraction(4421159, 10**9), 6, 247, False),
+        (Fraction(1001, 24000), 6, 50, False),
+    ],
+)
+def test_a_period_that_is_no_simple_fraction_is_known_to_the_rounding_of_all_stamps(
+    period: Fraction, decimals: int, count: int, *, meant: bool
+) -> None:
+    t = np.round([float(k * period) for k in range(count)], decimals)
+    stamps = Stamps(0.5 * 10.0**-decimals, 0.0)
+    assert stamps.taken(t)[1].all()
+    lattice = stamps.lattice
+    assert lattice is not None
+    off = abs(lattice.period - float(period))
+    assert (
+        lattice.loose == 0.0 if meant else off <= lattice.loose <= 4.1 * 0.5 * 10.0**-decimals / (count - 2)
+    )
+    assert off < 1e-15 or not meant
+
+
+def test_a_last_stamp_that_is_less_than_a_period_behind_is_not_that_before_it() -> None:
+    """In milliseconds 13 is as near to five periods of 2.4 as 12 is: a piece between them lasts."""
+    t = np.array([0.0, 0.002, 0.005, 0.007, 0.010, 0.012, 0.013])
+    times, exact = Stamps(5e-4, 0.0).taken(t)
+    assert (np.diff(times) > 0).all()
+    assert exact.tolist() == [True] * 6 + [False]

@@ -18,6 +18,7 @@ from trajcli.streams.recorded.stamp_period import simplest_between
 
 _FEW = 3  # rows that make no period
 _ROUNDING = 4.0  # units in the last place that a sum of periods may be off
+_BY_CHANCE = 0.1  # fractions: of a period that is none of whole hertz, fewer than these are met by chance
 _SLACK = 1e-9  # of the period: what adding it up row by row may be off, and nobody's limit notices
 
 
@@ -33,11 +34,13 @@ class Lattice:
         origin: Of the first stamp, s.
         period: s.
         slack: By how much stamps may be beside its multiples because the first one was rounded, s.
+        loose: By how much the period may be off where the fraction is none that anybody means, s.
     """
 
     origin: float
     period: float
     slack: float = 0.0
+    loose: float = 0.0
 
 
 class Stamps:
@@ -88,6 +91,7 @@ class Stamps:
         fits = np.abs(t - meant) <= slack
         if not fits[:-1].all():
             raise UnfitError("a time stamp does not fit the period")
+        fits[-1] &= np.append(self._index - 1, steps)[-2] < steps[-1]
         self._off = not fits[-1]  # the last row may stand at the end of the motion
         counted = np.diff(np.append(self._index - 1 if steps[0] else -1, steps[fits]))
         self.regular = self.regular and bool((counted == 1).all())
@@ -123,9 +127,12 @@ def lattice_of(t: Array, errors: Array) -> Lattice | None:
         if low > high:
             return None
         if counted >= steps[-1]:
-            period = (
-                float(simplest_between(Fraction(low), Fraction(high))) if low > 0.0 else 0.5 * (low + high)
+            meant = (
+                simplest_between(Fraction(low), Fraction(high)) if low > 0.0 else Fraction((low + high) / 2)
             )
+            period = float(meant)
+            chance = meant.denominator**2 * (high - low)  # how many fractions as simple are so near
+            loose = 0.0 if meant.numerator == 1 or chance <= _BY_CHANCE else max(high - period, period - low)
             break
         period = 0.5 * (low + high)
         counted *= max(0.1 * period / error, 2.0)
@@ -134,7 +141,7 @@ def lattice_of(t: Array, errors: Array) -> Lattice | None:
     steps = np.rint(since / period)
     remainder = np.abs(inner - (origin + steps * period)) - slack
     fits = (remainder <= errors + _ROUNDING * np.spacing(np.abs(inner))).all() and (np.diff(steps) > 0).all()
-    return Lattice(origin, period, slack) if fits else None
+    return Lattice(origin, period, slack, loose) if fits else None
 
 
 def _origin(first: float, period: float, error: float) -> float:
