@@ -5,7 +5,6 @@ Linear rows come first and belong to the tcp as the point of reference; angular 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -19,8 +18,6 @@ from trajcli.kinematics.columns import (
     cross,
     dot,
     minus,
-    plus,
-    scaled,
 )
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import (
@@ -85,23 +82,40 @@ def jacobian_dot_qd(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceF
     (a, e) = J qdd + this. In the world and base frames it is the time derivative of J times qd; for the tcp
     the same acceleration is written in the axes of the tcp.
 
-    A joint with the column (v, w) turns by w qd, and is turned by W, the sum of those before it. So it adds
-    W x w qd to the angular part and (2 W + w qd) x v qd to the linear one: it turns the columns of those
-    behind it, and they move the tcp under its axis.
-
     Raises:
         InputError: When the robot has no geometry, or q and qd have not n finite values of the same batch.
-
-    Source: the columns of the geometric Jacobian differentiated; compare Siciliano et al. (2009), chapter 3.
     """
-    links, values, rates = links_of(robot), *_state(robot, q, qd)
-    result = np.zeros((values.size // values.shape[-1], 6))
-    for rows, (block, rate) in blocks(values, rates):
-        axes, tcp = travel(links, _start(robot, frame), robot.tool, block)
-        linear, angular = _bias(axes, tcp.p, rate)
-        _write(result[rows, :3], _in_frame(linear, tcp, frame))
-        _write(result[rows, 3:], _in_frame(angular, tcp, frame))
-    return result.reshape(*values.shape[:-1], 6)
+    values, rates = _state(robot, q, qd)
+    return acceleration_bias(jacobian(robot, values, frame), rates)
+
+
+def acceleration_bias(jacobians: Array, rates: Array) -> Array:
+    """Return the part of the tcp's acceleration that does not come from qdd, shape (*batch, 6).
+
+    A joint turns the columns of those behind it, and moves the tcp under the axes of those before it: either
+    way the change of the linear column is the angular column of the joint nearer to the base times the linear
+    column of the other.
+
+    Args:
+        jacobians: Shape (*batch, 6, n), in any axes: those of the result.
+        rates: Joint velocities, shape (*batch, n).
+
+    Source: Haviland and Corke, A systematic approach to computing the manipulator Jacobian and Hessian using
+    the elementary transform sequence (2020), section 4.
+    """
+    moved = jacobians * rates[..., None, :]
+    linear, angular = moved[..., :3, :], moved[..., 3:, :]
+    spin = np.cumsum(angular, axis=-1)
+    before = np.zeros_like(spin)
+    before[..., 1:] = spin[..., :-1]
+    bias = _across(spin + before, linear), _across(before, angular)
+    return np.asarray(np.concatenate(bias, axis=-2).sum(axis=-1))
+
+
+def _across(a: Array, b: Array) -> Array:
+    """Return the vector products of columns (*batch, 3, n)."""
+    y, z = [1, 2, 0], [2, 0, 1]
+    return np.asarray(a[..., y, :] * b[..., z, :] - a[..., z, :] * b[..., y, :])
 
 
 def tcp_twist(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceFrame = "world") -> Array:
@@ -142,19 +156,6 @@ def _columns(axis: JointAxis, p: VectorEntries) -> tuple[VectorEntries, VectorEn
     if axis.prismatic:
         return axis.direction, ZERO
     return cross(axis.direction, minus(p, axis.point)), axis.direction
-
-
-def _bias(
-    axes: Sequence[JointAxis], p: VectorEntries, rate: Sequence[Array]
-) -> tuple[VectorEntries, VectorEntries]:
-    """Return the linear and the angular acceleration of the point p without joint accelerations."""
-    spin = linear = angular = ZERO
-    for axis, speed in zip(axes, rate, strict=True):
-        moved, turned = (scaled(speed, column) for column in _columns(axis, p))
-        angular = plus(angular, cross(spin, turned))
-        before, spin = spin, plus(spin, turned)
-        linear = plus(linear, cross(plus(before, spin), moved))
-    return linear, angular
 
 
 def _in_frame(vector: VectorEntries, tcp: MovingFrame, frame: ReferenceFrame) -> VectorEntries:

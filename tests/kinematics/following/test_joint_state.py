@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from trajcli.job.robot import load_robot
-from trajcli.kinematics.following.follower import acceleration_bias
-from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.jacobian import acceleration_bias, jacobian
 
 
 @pytest.mark.parametrize("name", ["puma560", "panda", "cobra600", "rrp", "cartesian_wrist", "planar3r"])

@@ -11,8 +11,8 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.pose import PosePath
 from trajcli.geometry.paths.position import Side, Triple
-from trajcli.kinematics.following.follower import Follower, acceleration_bias
-from trajcli.kinematics.jacobian import linearisation
+from trajcli.kinematics.following.follower import Follower
+from trajcli.kinematics.jacobian import acceleration_bias, linearisation
 
 
 @frozen

@@ -26,7 +26,7 @@ from trajcli.geometry.rotation import AXES
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.tool_path import ToolReference
 from trajcli.kinematics.inverse.target import IkTarget, residual_jacobian, residuals
-from trajcli.kinematics.jacobian import linearisation
+from trajcli.kinematics.jacobian import acceleration_bias, linearisation
 from trajcli.kinematics.robot import Robot
 
 ReferenceAt = Callable[[Array, Side], ToolReference]
@@ -282,26 +282,3 @@ def _completed(reference: ToolReference, poses: Array, rows: Array) -> Array:
     split = sum(reference.position)
     column[:, split : split + 3, 0] = poses[:, :3, AXES.index(reference.tool_axis)]
     return np.concatenate([rows, column], axis=2)
-
-
-def acceleration_bias(jacobians: Array, rates: Array) -> Array:
-    """Return the part of the tcp's acceleration that does not come from qdd, shape (N, 6).
-
-    A joint turns the columns of those behind it, and moves the tcp under the axes of those before it: either
-    way the change of the linear column is the angular column of the joint nearer to the base times the linear
-    column of the other.
-
-    Args:
-        jacobians: In world, shape (N, 6, n).
-        rates: Joint velocities, shape (N, n).
-
-    Source: Haviland and Corke, A systematic approach to computing the manipulator Jacobian and Hessian using
-    the elementary transform sequence (2020), section 4.
-    """
-    moved = jacobians * rates[:, None, :]
-    linear, angular = moved[:, :3], moved[:, 3:]
-    spin = np.cumsum(angular, axis=2)
-    before = np.zeros_like(spin)
-    before[:, :, 1:] = spin[:, :, :-1]
-    bias = np.cross(spin + before, linear, axis=1), np.cross(before, angular, axis=1)
-    return np.asarray(np.concatenate(bias, axis=1).sum(axis=2))
