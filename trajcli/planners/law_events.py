@@ -1,10 +1,12 @@
-"""Events of time-optimal laws along paths: how they were found, and how near to the optimum."""
+"""Events of laws: how they were found, how near they are to the optimum, which limit of jerk they keep."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, Amounts
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Event
@@ -45,3 +47,12 @@ def distance_from_bound(motion: TimeOptimalMotion, robot: Robot, stretch: float 
         return Event("bound", text, amounts=amounts)
     text += "{joint} alone needs {bound} between its turning points"
     return Event("bound", text, amounts={**amounts, "joint": robot.joint_names[joint]})
+
+
+def jerk_events(names: Sequence[str], bounds: Iterable[Array]) -> list[Event]:
+    """Return the event of jerk limits, (2,) of each joint, that differ by direction."""
+    some = [name for name, (low, high) in zip(names, bounds, strict=True) if low != -high]
+    text = (
+        f"the jerk limit of {', '.join(some)} differs by direction: the smaller magnitude is kept both ways"
+    )
+    return [Event("jerk_limit_both_ways", text)] if some else []

@@ -112,9 +112,9 @@ class PhaseProfile:
         named: list[Phase] = []
         for name, start, end in zip(self._names(), [0.0, *ends], [*ends, self.duration], strict=False):
             if named and named[-1].name == name:
-                named[-1] = Phase(name, named[-1].start, end, joint, None)
+                named[-1] = Phase(name, named[-1].start, end, joint)
             else:
-                named.append(Phase(name, start, end, joint, None))
+                named.append(Phase(name, start, end, joint))
         return named
 
     def _names(self) -> list[str]:

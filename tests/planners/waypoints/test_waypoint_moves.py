@@ -294,3 +294,5 @@ def test_a_jerk_that_differs_by_direction_bounds_the_fastest_by_its_larger_side(
     plan = plan_of(case, robot=robot, straight=straight)
     certificate = plan.moves[0].planned.certificate
     assert 0.5 < certificate.lower < faster < plan.trajectory.duration
+    assert [event.kind for event in plan.events] == ["jerk_limit_both_ways"]
+    assert "of j1 differs by direction" in plan.events[0].message

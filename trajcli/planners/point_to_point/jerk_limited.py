@@ -17,6 +17,7 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.targets import MinimumDuration
 from trajcli.planners.boundary_states import instant, missing_limit
+from trajcli.planners.law_events import jerk_events
 from trajcli.planners.planner import Event, Phase, Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.planners.ruckig import (
@@ -328,18 +329,8 @@ def _duration_events(least: float, duration: float, alone: float) -> list[Event]
 
 
 def _jerk_events(boundaries: Sequence[BoundaryProblem]) -> list[Event]:
-    """Return the event of jerk limits that differ by direction."""
-    names = [
-        boundary.name
-        for boundary in boundaries
-        if not boundary.steady and boundary.bounds[2, 0] != -boundary.bounds[2, 1]
-    ]
-    if not names:
-        return []
-    message = (
-        f"the jerk limit of {', '.join(names)} differs by direction: the smaller magnitude is kept both ways"
-    )
-    return [Event("jerk_limit_both_ways", message)]
+    moving = [boundary for boundary in boundaries if not boundary.steady]
+    return jerk_events([boundary.name for boundary in moving], [boundary.bounds[2] for boundary in moving])
 
 
 def _require_limits(boundaries: Sequence[BoundaryProblem], robot: Robot) -> None:

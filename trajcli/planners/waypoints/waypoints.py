@@ -29,6 +29,7 @@ from trajcli.language.per_joint import read_each
 from trajcli.language.recorded import Recorded
 from trajcli.language.waypoints import Waypoint
 from trajcli.planners.boundary_states import missing_limit, standstill
+from trajcli.planners.law_events import jerk_events
 from trajcli.planners.planner import Certificate, Planned
 from trajcli.planners.waypoints.given_points import (
     GivenPoints,
@@ -211,7 +212,7 @@ class FastestThroughPoints(PointSequence):
             points.target,
             phases=motion.phases,
             via_points=ViaPoints(motion.times, points.positions, np.zeros_like(points.positions)),
-            events=points.events,
+            events=(*points.events, *jerk_events(names, robot.limits.jerk[joints])),
             certificate=certificate,
         )
 
