@@ -70,6 +70,18 @@ def test_both_rates_of_an_interval_may_be_rounded(share: float, broken: bool, or
 
 
 @SIDES
+@pytest.mark.parametrize(("steps", "jump"), [((1, 1), False), ((1, 4.1), True), ((1, 3.9), False), ((1, -1), True)])
+def test_of_three_rows_that_go_on_in_one_direction_none_jumps(
+    steps: tuple[float, float], jump: bool, side: int
+) -> None:
+    """As one of four, which is over a limit of the velocity alone; there and back is a jump, as ever."""
+    q = side * np.cumsum([0.0, *steps])
+    limits = replace(unlimited(1), velocity=np.array([[-0.5, 0.5]]))
+    found = inconsistent(rows(q, t=np.arange(3.0)), limits)
+    assert bool(found) == jump
+
+
+@SIDES
 @pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])
 def test_both_stamps_of_an_interval_may_be_rounded(share: float, broken: bool, side: int) -> None:
     late, speed = 1e-4, np.full(COUNT, side * 1.0)

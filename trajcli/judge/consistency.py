@@ -90,10 +90,14 @@ class Changes:
         """Return which of some values (P, n) are much larger than those near to them, but for one beside."""
         near = piece + np.arange(-_NEAR, _NEAR + 1)[:, None]
         inside = (near >= 0) & (near < len(values))
-        sizes = np.where(inside, np.abs(values[np.clip(near, 0, len(values) - 1), joint]), 0.0)
+        steps = np.where(inside, values[np.clip(near, 0, len(values) - 1), joint], 0.0)
+        sizes = np.abs(steps)
         own = sizes[_NEAR].copy()
         largest = (own > 0.0) & (own >= sizes.max(axis=0))
-        return np.asarray(largest & (np.sort(sizes, axis=0)[-3] * _ISOLATED <= own))
+        alone = np.sort(sizes, axis=0)[-3] * _ISOLATED <= own
+        if self.order == 0 and len(values) == 2:  # nothing else tells a jump from a motion that goes on
+            alone &= np.abs(steps.sum(axis=0)) * _ISOLATED <= own * (_ISOLATED + 1)
+        return np.asarray(largest & alone)
 
 
 def changes_of(window: Intervals) -> list[Changes]:
