@@ -21,7 +21,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.extrema import critical_points
+from trajcli.curves.extrema import all_roots, critical_points
 from trajcli.curves.piecewise import Array, control_points, derivative_coefficients, horner
 from trajcli.frozen import comparable, frozen
 
@@ -148,13 +148,8 @@ def durations_at_limit(coefficients: Array, lengths: Array, limits: ApproachLimi
     speeds = -derivative_coefficients(distances, 1)
     excess = _excess(distances, speeds / (1 - near), *(np.tile(each, shape[0]) for each in (d, o)))
     whole = np.repeat(lengths, shape[1])
-    roots = [np.zeros((1, whole.size)), whole[None]]
-    for polynomial in (excess, speeds):
-        powers = np.arange(len(polynomial), 0, -1, dtype=np.float64)
-        antiderivative = np.concatenate([polynomial / powers[:, None], np.zeros((1, whole.size))])
-        (inside,) = critical_points(antiderivative[:, :, None], whole, (0,))
-        roots.append(inside[:, :, 0])
-    knots = np.sort(np.concatenate(roots), axis=0)
+    roots = (all_roots(each[:, :, None], whole)[:, :, 0] for each in (excess, speeds))
+    knots = np.sort(np.concatenate([np.zeros((1, whole.size)), whole[None], *roots]), axis=0)
     middles = (knots[1:] + knots[:-1]) / 2
     at_limit = (horner(excess, middles) >= 0) & (horner(speeds, middles) > ROOM)
     seconds = np.where(at_limit, np.diff(knots, axis=0), 0.0).sum(axis=0).reshape(shape).sum(axis=0)
@@ -254,10 +249,7 @@ def _crossings(distances: Array, lengths: Array, limit: Sequence[Array]) -> Arra
     deceleration, offset = limit
     shifted = distances.copy()
     shifted[-1] -= offset**2 / (2.0 * deceleration)
-    powers = np.arange(len(shifted), 0, -1, dtype=np.float64)
-    whole = np.concatenate([shifted / powers[:, None], np.zeros((1, shifted.shape[1]))])
-    (inside,) = critical_points(whole[:, :, None], lengths, (0,))
-    return np.concatenate([inside[:, :, 0], lengths[None]])
+    return np.concatenate([all_roots(shifted[:, :, None], lengths)[:, :, 0], lengths[None]])
 
 
 def _excess(distances: Array, speeds: Array, deceleration: Array, offset: Array) -> Array:

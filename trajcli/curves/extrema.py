@@ -212,6 +212,20 @@ def critical_points(coefficients: Array, lengths: Array, orders: Sequence[int]) 
     return [roots.get(order + 1, nowhere) * lengths[:, None] for order in orders]
 
 
+def all_roots(coefficients: Array, lengths: Array) -> Array:
+    """Return all roots of polynomials, (k, w, n), ascending, each from 0 to its own length.
+
+    They are the critical points of the antiderivative; other points of the piece stand in for missing ones.
+
+    Args:
+        coefficients: Shape (degree + 1, w, n), highest power first.
+        lengths: Shape (w,), none negative.
+    """
+    powers = np.arange(len(coefficients), 0, -1)[:, None, None]
+    integral = np.concatenate([coefficients / powers, np.zeros((1, *coefficients.shape[1:]))])
+    return critical_points(integral, lengths, (0,))[0]
+
+
 def durations_above(coefficients: Array, lengths: Array, levels: Array) -> Array:
     """Return for how long polynomials are at or above a level, each from 0 to its own length, shape (w, n).
 
@@ -224,10 +238,7 @@ def durations_above(coefficients: Array, lengths: Array, levels: Array) -> Array
     """
     above = np.array(coefficients)
     above[-1] -= levels
-    powers = np.arange(above.shape[0], 0, -1)[:, None, None]
-    # the roots of a polynomial are the critical points of its antiderivative
-    antiderivative = np.concatenate([above / powers, np.zeros((1, *above.shape[1:]))])
-    (roots,) = critical_points(antiderivative, lengths, (0,))
+    roots = all_roots(above, lengths)
     shape = (1, *above.shape[1:])
     ends = np.broadcast_to(lengths[:, None], shape)
     knots = np.sort(np.concatenate([np.zeros(shape), np.clip(roots, 0.0, ends), ends]), axis=0)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.extrema import critical_points, piece_extremes
+from trajcli.curves.extrema import all_roots, piece_extremes
 from trajcli.curves.piecewise import (
     Array,
     PiecewisePolynomial,
@@ -181,9 +181,7 @@ def _crossings(path: PiecewisePolynomial, law: PiecewisePolynomial) -> Array:
     passed = path.breaks[np.arange(piece.size) + np.repeat(first - (np.cumsum(count) - count), count)]
     offset = law.coefficients[:, piece].copy()
     offset[-1, :, 0] -= passed
-    powers = np.arange(law.degree + 1, 0, -1)[:, None, None]
-    integral = np.concatenate([offset / powers, np.zeros((1, piece.size, 1))])
-    local = critical_points(integral, law.lengths[piece], (0,))[0][:, :, 0]
+    local = all_roots(offset, law.lengths[piece])[:, :, 0]
     inside = (local > 0) & (local < law.lengths[piece])
     inside &= np.abs(horner(offset[:, :, 0], local)) <= _NEAR * apart  # the rest stands in for missing roots
     return np.asarray((law.breaks[piece] + local)[inside])
