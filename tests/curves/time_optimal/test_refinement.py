@@ -12,7 +12,14 @@ from topp_paths import assert_motion, random_bounds, spline, symmetric
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.collocation import IntervalRows
 from trajcli.curves.time_optimal.parameterization import time_optimal
-from trajcli.curves.time_optimal.refinement import first_grid, halved, parts_for, refined, time_lost
+from trajcli.curves.time_optimal.refinement import (
+    first_grid,
+    halved,
+    parts_for,
+    refined,
+    shortest_intervals,
+    time_lost,
+)
 from trajcli.curves.time_optimal.time_law import law_and_trajectory, law_pieces
 
 
@@ -178,6 +185,71 @@ def test_at_the_ends_no_lines_meet(x):
     """Beyond the first and the last interval there is none: they are cut in the middle."""
     found = refined(np.arange(4.0), np.array(x), np.full(3, 2))
     np.testing.assert_allclose(found[[1, -2]], [0.5, 2.5], atol=1e-15)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.05, 0.81])
+@pytest.mark.parametrize("jump", [3.0, 0.06])
+@pytest.mark.parametrize("parts", [2, 4])
+def test_an_interval_is_cut_where_the_lines_of_its_neighbours_meet(share, jump, parts):
+    """However little sd^2 bends there: that point takes the place of the nearest one."""
+    grid = np.array([0.0, 2.0, 5.0, 6.0])
+    rise, fall = 1.0, 1.0 - jump
+    x = 9.0 + np.cumsum([0.0, 2.0 * rise, 3.0 * (share * rise + (1.0 - share) * fall), fall])
+    found = refined(grid, x, np.array([1, parts, 1]))
+    inner = np.arange(1.0, parts)
+    inner[np.abs(inner / parts - share).argmin()] = share * parts
+    np.testing.assert_allclose(found, [0.0, 2.0, *(2.0 + 3.0 * inner / parts), 5.0, 6.0], rtol=1e-12)
+
+
+def turning(at: float, length: float, height: float = 1.0) -> PiecewisePolynomial:
+    """Return a path of one joint that goes on evenly, and one whose slope at the ends is some heights of that."""
+    slopes = np.array([[0.0, 1.0, 0.0], [height / length, -2.0 * height / length * at, 0.0]])
+    return PiecewisePolynomial(np.array([0.0, length]), slopes.T[:, None, :])
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        turning(51 / 96, 2.0),  # of 96 parts of a path of length 1 it would be the end of one
+        turning(3.7e6, 1e7),
+        turning(0.3701, 1.0, 1e-3),  # its slope is a thousandth of that of the other joint
+        turning((20 + 0.05) / 96, 1.0),  # near to a grid point
+    ],
+)
+def test_a_place_where_a_joint_turns_is_a_grid_point(path):
+    second, first, _ = path.coefficients[:, 0, 1]
+    assert np.abs(first_grid(path) + 0.5 * first / second).min() <= 1e-9 * path.end
+
+
+def test_a_joint_whose_slope_changes_by_a_millionth_in_a_short_piece_stands_still():
+    """Of rounding in q nobody can tell where it turns."""
+    coefficients = np.zeros((3, 2, 2))
+    coefficients[1, :, 0] = 1.0
+    coefficients[0, 0, 1], coefficients[1, 0, 1] = 1.0, -0.74e-7
+    assert np.abs(first_grid(PiecewisePolynomial([0.0, 1e-7, 1.0], coefficients)) - 0.37e-7).min() > 1e-11
+
+
+def test_breaks_of_a_path_are_grid_points_and_each_piece_has_four_intervals():
+    """However short a piece is beside others, and however many there are."""
+    for breaks in (np.array([0.0, 1.0, 1.0 + 1e-5, 3.0]), np.linspace(0.0, 1.0, 201)):
+        path = PiecewisePolynomial(breaks, np.stack([np.ones((breaks.size - 1, 1)), breaks[:-1, None]]))
+        grid = first_grid(path)
+        assert np.isin(breaks, grid).all()
+        inside = np.histogram(grid, breaks)[0]
+        assert inside.min() >= 4
+        piece = np.searchsorted(breaks, grid[:-1], "right") - 1
+        share = shortest_intervals(path, grid) / np.diff(breaks)[piece]  # of their piece
+        np.testing.assert_allclose(share, share[0], rtol=1e-12)
+        assert 0.0 < share[0] < 1.0 / inside.max()
+
+
+def test_no_interval_loses_less_than_nothing():
+    """Where sd^2 is on its curve and at a limit but for rounding; at a curve of zero nothing is below it."""
+    grid, x = np.arange(4.0), np.array([0.0, 2.0, 2.0, 0.0])
+    rows = (FREE, (-1.0, 1.0, np.diff(x) * (1 - 1e-7)), (1.0, -1.0, 5.0))
+    assert (time_lost(rows_over(grid, *rows), x, x * (1 - 1e-7), np.ones(3)) >= 0.0).all()
+    nothing = time_lost(rows_over(grid, FREE), np.zeros(4), np.zeros(4), np.ones(3))
+    np.testing.assert_array_equal(nothing, np.zeros(3))
 
 
 @pytest.mark.parametrize("apart", [1e-12, 1e-9, 1e-7])
