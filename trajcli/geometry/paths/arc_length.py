@@ -11,7 +11,7 @@ Source: Blanes, Casas, Oteo and Ros, The Magnus expansion and some of its applic
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 
 import numpy as np
 
@@ -62,23 +62,12 @@ class ArcLength:
     def parameter(self, s: Array) -> Array:
         """Return u (N,) at the arc lengths s (N,), m."""
         panel = np.clip(np.searchsorted(self.lengths, s, "right") - 1, 0, self.knots.size - 2)
-        low, high = self.knots[panel], self.knots[panel + 1]
-        distance, whole = s - self.lengths[panel], self.lengths[panel + 1] - self.lengths[panel]
-        # begin with the cubic that has the slopes du/ds of both ends of the panel
-        part = distance / whole
-        first, last = (whole / self._speeds[k] for k in (panel, panel + 1))
-        u = low + part * first
-        u += part**2 * (3.0 * (high - low) - 2.0 * first - last + part * (first + last - 2.0 * (high - low)))
-        for _ in range(_NEWTON_STEPS):
-            step = (self._between(low, u) - distance) / self._speed(u)
-            u = np.clip(u - step, low, high)
-            if not (np.abs(step) > _NEAR).any():
-                break
-        return u
-
-    @cached_property
-    def _speeds(self) -> Array:
-        return self._speed(self.knots)
+        return _inverse(
+            self._speed,
+            (self.knots[panel], self.knots[panel + 1]),
+            self.lengths[panel + 1] - self.lengths[panel],
+            s - self.lengths[panel],
+        )
 
     def _speed(self, u: Array) -> Array:
         square = sum(_value(column, u) ** 2 for column in self._slope.T)
@@ -99,16 +88,24 @@ def inverted_length(square: Array, panels: tuple[Array, Array], whole: Array, di
         whole: Arc length of each panel, shape (N,), m.
         distance: Shape (N,), m.
     """
+    return _inverse(partial(_speed_of, square), panels, whole, distance)
+
+
+def _inverse(
+    speed: Callable[[Array], Array], panels: tuple[Array, Array], whole: Array, distance: Array
+) -> Array:
+    """Return u (N,) by Newton's method, from |r'| at u (N, m)."""
     low, high = panels
+    # begin with the cubic that has the slopes du/ds of both ends of the panel
     part = distance / whole
-    first, last = (whole / _speed_of(square, u[:, None])[:, 0] for u in panels)
+    first, last = (whole / speed(u[:, None])[:, 0] for u in panels)
     u = low + part * first
     u += part**2 * (3.0 * (high - low) - 2.0 * first - last + part * (first + last - 2.0 * (high - low)))
     nodes, weights = _gauss()
     for _ in range(_NEWTON_STEPS):
         width = (u - low)[:, None]
-        gone = (_speed_of(square, low[:, None] + width * nodes) * width) @ weights
-        step = (gone - distance) / _speed_of(square, u[:, None])[:, 0]
+        gone = (speed(low[:, None] + width * nodes) * width) @ weights
+        step = (gone - distance) / speed(u[:, None])[:, 0]
         u = np.clip(u - step, low, high)
         if not (np.abs(step) > _NEAR).any():
             break
