@@ -297,3 +297,9 @@ def test_words_that_mean_nothing_are_refused(tmp_path: Path) -> None:
     with pytest.raises(trajcli.InputError, match=r"a page is HTML, and 'view\.txt' is"):
         trajcli.view(EXAMPLES / "cubic.yaml", tmp_path / "view.txt")
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("name", [3, None, {"joints": 2}])
+def test_a_robot_that_is_no_name_is_wrong_input(name: object) -> None:
+    with pytest.raises(trajcli.InputError, match="the catalogue has no robot"):
+        trajcli.load_robot(name)  # type: ignore[arg-type]

@@ -238,7 +238,7 @@ def load_robot(name: str | Path) -> Arm:
         InputError: When the catalogue has no such robot, or with every flaw of the file.
         FileError: When the file cannot be read.
     """
-    return Arm(**vars(load_sheet(name).robot))
+    return Arm(**vars(load_sheet(name if isinstance(name, Path) else str(name)).robot))
 
 
 def _loaded(job: str | Path | Mapping[str, Any] | LoadedJob, overrides: Sequence[str]) -> LoadedJob:
