@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from trajcli.checks.braking import braking_intervals
 from trajcli.checks.verify import verify
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.kinematics.robot import Limits
+from trajcli.kinematics.robot import Limits, unlimited
 from trajcli.trajectory import Promise, Span, State, Trajectory
 
 _FREE = np.tile([-np.inf, np.inf], (2, 1))
@@ -239,3 +241,11 @@ def test_two_joints_that_brake_are_each_excused():
     trajectory = Trajectory(curve, ("a", "b"), ("revolute",) * 2, (span,), *ends)
     assert _findings(trajectory, _limits()) == []
     assert sorted(_findings(trajectory, _limits(), None)) == [("a", "velocity"), ("b", "velocity")]
+
+
+def test_a_joint_that_rests_and_no_limit_of_jerk_make_no_warning():
+    """The suite takes warnings for errors: nothing times an unlimited jerk would be no number."""
+    limits = replace(unlimited(3), velocity=np.ones((3, 2)) * [-1, 1], acceleration=np.ones((3, 2)) * [-2, 2])
+    found = braking_intervals(np.array([1.5, 0.75, 0.0]), np.zeros(3), limits, on_line=True)
+    assert [(each.joint, each.order) for each in found] == [(0, 1)]
+    assert found[0].duration == pytest.approx(0.25)  # (1.5 - 1) / 2

@@ -81,7 +81,7 @@ def _common_braking(velocity: Array, acceleration: Array, direction: Array, boun
     moving = direction != 0
     scaled = np.sort(bounds[moving] / direction[moving, None, None], axis=2)
     tightest = np.stack([scaled[:, :, 0].max(axis=0), scaled[:, :, 1].min(axis=0)], axis=1)
-    bounds[:, 2] = np.minimum(np.abs(direction)[:, None] * tightest[2, 1], bounds[:, 2, 1:]) * [-1.0, 1.0]
+    bounds[moving, 2] = np.outer(np.abs(direction[moving]), tightest[2])
     size = float(direction @ direction)
     return braking(float(velocity @ direction) / size, float(acceleration @ direction) / size, tightest)
 
