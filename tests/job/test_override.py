@@ -191,6 +191,18 @@ def test_what_nothing_takes_the_place_of_is_asked_for(arm: Path) -> None:
     assert problem.hint == "write the whole of it: moves.0.to.xyz=[...]"
 
 
+@pytest.mark.parametrize("setting", ["start.joints.0=3", "start.joints=3"])
+def test_a_path_into_the_name_of_a_point_is_led_to_the_point(path: Path, setting: str) -> None:
+    """Nothing can be put inside a name, so that no list is asked for there; the advice works as it stands."""
+    with pytest.raises(InputError) as refused:
+        load_job(path, [setting])
+    (problem,) = refused.value.problems
+    assert problem.message == f"--set {setting}: 'joints' would stand inside a, which holds no keys"
+    point = f"points.a.{setting.removeprefix('start.').removesuffix('=3')}="
+    assert problem.hint == f"it is a point: {point}..."
+    assert load_job(path, [f"{point}4"]).job.start.joints is not None
+
+
 IN_FORCE = [  # limits, setting, the limit of the move, of each joint, deg/s or deg/s^2
     ("{velocity: 400}", "velocity.2=7", [400, 400, 7, 400, 400, 400]),
     ("{velocity: {elbow_joint: 9}}", "velocity.2=7", [180, 180, 7, 180, 180, 180]),

@@ -70,7 +70,9 @@ def test_both_rates_of_an_interval_may_be_rounded(share: float, broken: bool, or
 
 
 @SIDES
-@pytest.mark.parametrize(("steps", "jump"), [((1, 1), False), ((1, 4.1), True), ((1, 3.9), False), ((1, -1), True)])
+@pytest.mark.parametrize(
+    ("steps", "jump"), [((1, 1), False), ((1, 4.1), True), ((1, 3.9), False), ((1, -1), True)]
+)
 def test_of_three_rows_that_go_on_in_one_direction_none_jumps(
     steps: tuple[float, float], jump: bool, side: int
 ) -> None:

@@ -105,8 +105,24 @@ def overridden(document: Document, settings: Sequence[Setting]) -> Document:
     if not settings:
         return document
     for setting in settings:
+        _refuse_keys_of_values(document, setting)
         document = _patched(_written_out(document, setting), setting)
     return document
+
+
+def _refuse_keys_of_values(document: Document, setting: Setting) -> None:
+    """Refuse a path through a name, a number or nothing."""
+    for depth in range(len(setting.path)):
+        node = document.node(setting.path[:depth])
+        if node is None or isinstance(node.value, dict | list):
+            continue
+        at, below = (".".join(map(str, steps)) for steps in (setting.path[:depth], setting.path[depth:]))
+        point = isinstance(node.value, str) and document.node(("points", node.value))
+        hint = (
+            f"it is a point: points.{node.value}.{below}=..." if point else f"write the whole of it: {at}=..."
+        )
+        inside = f"would stand inside {node.text or 'an empty value'}, which holds no keys"
+        raise InputError(f"{setting.option}: '{setting.path[depth]}' {inside}", hint=hint if depth else None)
 
 
 def _patched(document: Document, setting: Setting) -> PatchedDocument:
@@ -245,9 +261,6 @@ def _with(node: Node, steps: _Steps, new: Node, option: str) -> Node:
             )
         items = [_with(v, steps[1:], new, option) if i == step else v for i, v in enumerate(value)]
         return node._replace(value=items)
-    if not isinstance(value, dict):
-        inside = node.text or "an empty value"
-        raise InputError(f"{option}: '{step}' would stand inside {inside}, which holds no keys")
-    name = str(step)
-    below = value.get(name, node._replace(value={}, keys={}))
-    return node._replace(value={**value, name: _with(below, steps[1:], new, option)})
+    fields, name = value if isinstance(value, dict) else {}, str(step)
+    below = fields.get(name, node._replace(value={}, keys={}))
+    return node._replace(value={**fields, name: _with(below, steps[1:], new, option)})
