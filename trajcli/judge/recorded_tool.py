@@ -23,7 +23,6 @@ from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import TOOL_KINDS, LimitKind
 from trajcli.limits.tolerances import TOOL_RELATIVE
 from trajcli.limits.tool import limits_tool, tool_excess, tool_peaks
-from trajcli.limits.tool_bound import ToolPeak
 
 if TYPE_CHECKING:
     from trajcli.planners.planner import PlannedMove
@@ -143,37 +142,24 @@ class ToolJudge:
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
             if order > int(window.highest[pieces].max()) or peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
                 continue
-            at = self._piece_at(window, pieces, robot, kind, breaks, peak.time)
-            warned = not asked and self._only_between(window, pieces, robot, kind, peak, at)
-            self._add_peak(window, pieces, robot, kind, peak, at, move, warned=warned)
-
-    def _add_peak(
-        self,
-        window: Intervals,
-        pieces: slice,
-        robot: Robot,
-        kind: LimitKind,
-        peak: ToolPeak,
-        at: tuple[int, float],
-        move: int,
-        *,
-        warned: bool,
-    ) -> None:
-        limit, (piece, local) = float(getattr(robot.limits.tcp, kind.key)), at
-        rounding = self._rounding(window, at, kind)
-        row, time = window.row_at(piece, local), float(window.t[piece]) + local
-        finding = replace(tool_excess(kind, peak.upper_bound, limit, time), row=row, rounding=rounding)
-        certain = peak.upper_bound - limit > rounding
-        count = max(self._over(window, pieces, robot, kind), 1)
-        self._worst.add(
-            kind.name,
-            move,
-            np.full(count, -1),
-            np.full(count, peak.upper_bound / limit),
-            lambda _: finding,
-            severity="warning" if warned and certain else "error",
-            certainty="exceeded" if certain else "within rounding",
-        )
+            at = piece, local = self._piece_at(window, pieces, robot, kind, breaks, peak.time)
+            rounding, row = self._rounding(window, at, kind), window.row_at(piece, local)
+            slack = limit * (1 + _CLOSE) + rounding
+            between = not asked and peak.upper_bound <= _TWICE * limit
+            warned = between and self._only_between(window, pieces, robot, kind, slack)
+            time = float(window.t[piece]) + local
+            found = replace(tool_excess(kind, peak.upper_bound, limit, time), row=row, rounding=rounding)
+            certain = peak.upper_bound - limit > rounding
+            count = max(self._over(window, pieces, robot, kind, limit), 1)
+            self._worst.add(
+                kind.name,
+                move,
+                np.full(count, -1),
+                np.full(count, peak.upper_bound / limit),
+                lambda _: found,  # noqa: B023 - of each move it is made at once
+                severity="warning" if warned and certain else "error",
+                certainty="exceeded" if certain else "within rounding",
+            )
 
     @staticmethod
     def _piece_at(
@@ -192,21 +178,12 @@ class ToolJudge:
         return pieces.start + after, time - float(breaks[after])
 
     def _only_between(
-        self,
-        window: Intervals,
-        pieces: slice,
-        robot: Robot,
-        kind: LimitKind,
-        peak: ToolPeak,
-        at: tuple[int, float],
+        self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, slack: float
     ) -> bool:
         """Return whether rows that stand dense keep a limit, as far as their differences make it certain."""
-        limit = float(getattr(robot.limits.tcp, kind.key))
-        order, angular = kind.order or 1, kind.dimension == "angle"
-        lengths = window.lengths[pieces, None]
-        if lengths.max() > DENSE or peak.upper_bound > _TWICE * limit:
+        order, angular, lengths = kind.order or 1, kind.dimension == "angle", window.lengths[pieces, None]
+        if lengths.max() > DENSE:
             return False
-        slack = limit * (1 + _CLOSE) + self._rounding(window, at, kind)
         rows = slice(pieces.start, pieces.stop + 1)
         states = tuple(None if values is None else values[rows] for values in window.states)
         q = np.asarray(states[0])
@@ -223,9 +200,8 @@ class ToolJudge:
         changes = np.linalg.norm(np.diff(part, axis=0) / lengths, axis=1)
         return bool((changes <= slack).all())
 
-    def _over(self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind) -> int:
+    def _over(self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, limit: float) -> int:
         """Return at how many rows a speed of the tool is over its limit; 0 for accelerations."""
-        limit = float(getattr(robot.limits.tcp, kind.key))
         if kind.order != 1:
             return 0
         coefficients = window.coefficients[:, pieces]

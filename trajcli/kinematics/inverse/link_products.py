@@ -13,6 +13,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
+from trajcli.kinematics.dh_rows import row_pose
 from trajcli.kinematics.robot import Robot
 from trajcli.kinematics.serial_chain import links_of
 
@@ -53,9 +54,10 @@ class _Constants(NamedTuple):
 @lru_cache(maxsize=16)
 def _constants(robot: Robot) -> _Constants:
     links = links_of(robot)
-    screws = [[_screw(*link.before) for link in links], [_screw(*link.after) for link in links]]
-    following = [*screws[0][1:], robot.tool]
-    after = np.array([own @ next_one for own, next_one in zip(screws[1], following, strict=True)])
+    own = np.array([row_pose((0.0, 0.0, joint.a, joint.alpha, joint.beta)) for joint in robot.joints])
+    none = np.broadcast_to(np.eye(4), own.shape)
+    before, behind = (none, own) if robot.convention == "standard" else (own, none)
+    after = behind @ [*before[1:], robot.tool]
     sign, angle, distance = np.array([[link.sign, link.theta, link.d] for link in links]).T
     sliding = np.array([link.prismatic for link in links])
     quarter, lift = np.zeros((4, 4)), np.zeros((4, 4))
@@ -64,22 +66,9 @@ def _constants(robot: Robot) -> _Constants:
     parts = (np.diag([1.0, 1.0, 0.0, 0.0]), quarter, sign[:, None, None] * lift, still)
     along, across, slid, fixed = ((part @ after)[:, None] for part in parts)
     turning = np.where(sliding, 0.0, sign)[:, None]
-    base = robot.base @ screws[0][0]
+    base = robot.base @ before[0]
     slides = bool(sliding.any())
     return _Constants(base, along, across, slid, fixed, sign, angle[:, None], turning, sliding, slides)
-
-
-def _screw(a: float, cosine: float, sine: float, level: float = 1.0, tilt: float = 0.0) -> Array:
-    """Return the slide along x by a with the turn about it, then the tilt about y of that cosine and sine."""
-    turned = np.array(
-        [[1.0, 0.0, 0.0, a], [0.0, cosine, -sine, 0.0], [0.0, sine, cosine, 0.0], [0.0, 0.0, 0.0, 1.0]]
-    )
-    return turned @ [
-        [level, 0.0, tilt, 0.0],
-        [0.0, 1.0, 0.0, 0.0],
-        [-tilt, 0.0, level, 0.0],
-        [0.0, 0.0, 0.0, 1.0],
-    ]
 
 
 def poses_and_jacobians(robot: Robot, q: Array) -> tuple[Array, Array]:

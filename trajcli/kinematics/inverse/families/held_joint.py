@@ -21,9 +21,9 @@ from functools import lru_cache
 import numpy as np
 
 from trajcli.curves.piecewise import Array
+from trajcli.kinematics.dh_rows import row_pose
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot
-from trajcli.kinematics.serial_chain import links_of
 
 _JOINTS = 7
 _DUST = 1e-15  # what products of exact zeros and ones leave
@@ -57,11 +57,10 @@ def poses_for_the_others(robot: Robot, poses: Array, last: Array) -> Array:
 @lru_cache(maxsize=16)
 def _parts_of_change(robot: Robot) -> tuple[Array, Array, Array]:
     """Return what is fixed, times the cosine and times the sine of the last joint, each (4, 4)."""
-    link = links_of(robot)[-1]
-    a, cosine, sine = link.after
-    after = np.array([[1.0, 0, 0, a], [0, cosine, -sine, 0], [0, sine, cosine, 0], [0, 0, 0, 1.0]])
-    tip = after @ robot.tool
+    last, tip = robot.joints[-1], robot.tool
+    if robot.convention == "standard":
+        tip = row_pose((0.0, 0.0, last.a, last.alpha, 0.0)) @ tip
     back = np.linalg.inv(tip)
     turning, quarter = np.diag([1.0, 1.0, 0.0, 0.0]), np.zeros((4, 4))
     quarter[0, 1], quarter[1, 0] = 1.0, -1.0
-    return back @ (np.eye(4) - turning) @ tip, back @ turning @ tip, back @ (link.sign * quarter) @ tip
+    return back @ (np.eye(4) - turning) @ tip, back @ turning @ tip, back @ (last.sign * quarter) @ tip
