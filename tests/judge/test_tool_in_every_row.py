@@ -528,7 +528,7 @@ def test_the_one_row_at_a_singularity_is_found(row: int, count: int, size: int, 
     q[:, 1] = np.minimum(0.06 * np.abs(np.arange(count) - row), 1.5) + 1e-5
     (found,) = of_wrist(q, size)
     assert (found.severity, found.row, found.time) == ("warning", row + 1, pytest.approx(PERIOD * row))
-    assert found.value == pytest.approx(0.5e-5, rel=1e-3)
+    assert (found.value, found.method) == (pytest.approx(0.5e-5, rel=1e-3), "sampled")
 
 
 @pytest.mark.parametrize("size", [40, 7])
@@ -607,6 +607,22 @@ def test_rounding_counts_with_the_speeds_of_joints_that_turn_against_each_other(
 
 
 @SIDES
+def test_rounding_of_the_jerk_of_a_turning_tool_is_the_sum_of_what_its_rates_are_off_by(side: float) -> None:
+    """Of a jerk j and a turn at w: L (j - w^3) and 3 L w a, turned by the angle itself: by the rule of Leibniz.
+
+    At 10 rad/s with a rounding of q in quintics of a second each: 15/4, 20 / root 3 and 120 of it in its rates.
+    """
+    off, rate, t = 1e-6, 10.0, np.arange(3.0)
+    q, qd = np.zeros((3, 2)), np.zeros((3, 2))
+    q[:, 0], qd[:, 0] = side * rate * t, side * rate
+    roundings = Resolution(0.0, np.array([off, 0.0]), np.zeros(2), np.zeros(2))
+    motion = replace(rows(t, q, qd, 0 * q), resolution=roundings)
+    (found,) = of_tool(motion, link(jerk=0.9 * LEVER * rate**3), "quintic")
+    own, turned = 120 + 3 * (rate * 20 / 3**0.5 + rate**2 * 15 / 4), rate**3
+    assert found.rounding == pytest.approx(LEVER * (own + turned) * off, rel=2e-2)
+
+
+@SIDES
 def test_rounding_of_a_turn_counts_three_times_in_the_jerk_of_the_tool(side: float) -> None:
     """At 4 rad/s: 15/8 of twice the rounding more speed, and its cube: 3 L w^2 of it, beside 60 L of its own jerk."""
     off, rate, t = 1e-4, 4.0, np.arange(2.0)
@@ -640,10 +656,12 @@ def test_rounding_of_a_slide_that_is_swung_counts_with_its_length(key: str, powe
     assert [each.certainty for each in of_tool(farther, beam, "quintic")] == ["exceeded"]
 
 
-def test_rows_at_which_the_tool_is_too_fast_are_counted_wherever_it_goes() -> None:
-    """Half a turn at an even speed, of which each direction in space has its share."""
-    t = np.linspace(0.0, np.pi, 41)
-    (found,) = of_tool(rows(t, np.stack([t, 0.0 * t], axis=1)), link(speed=0.9 * LEVER))
+@pytest.mark.parametrize(("key", "lever"), [("speed", LEVER), ("angular_speed", 1.0)])
+def test_rows_at_which_the_tool_is_too_fast_are_counted_wherever_it_goes(key: str, lever: float) -> None:
+    """Half a turn at an even speed, of which each direction in space has its share; then as far, but slower."""
+    t = np.append(np.linspace(0.0, np.pi, 41), np.pi + np.linspace(0.0, 1.5 * np.pi, 41)[1:])
+    turn = np.append(t[:41], np.pi + (t[41:] - np.pi) / 1.5)
+    (found,) = of_tool(rows(t, np.stack([turn, 0.0 * t], axis=1)), link(**{key: 0.9 * lever}))
     assert found.count == 40
 
 
