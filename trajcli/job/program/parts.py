@@ -62,7 +62,7 @@ class Parts:
             return [self._with_defaults(MovePart(entry))]
         parts = []
         if "retreat" in fields:
-            offset, frame = self._offset(fields["retreat"], (*path, "retreat"), 1.0)
+            offset, frame = self._offset(fields["retreat"], (*path, "retreat"))
             here = _relative(entry, "here", offset, frame)
             parts.append(self._straight(fields, "retreat", path, here, entry))
         if "approach" not in fields:
@@ -70,13 +70,12 @@ class Parts:
         target = fields.get("to")
         if target is None or not isinstance(target.value, str | dict):
             raise self._names.refused("an approach needs a target `to`", (*path, "approach"))
-        offset, frame = self._offset(fields["approach"], (*path, "approach"), 1.0)
-        back, _ = self._offset(fields["approach"], (*path, "approach"), -1.0)
+        offset, frame = self._offset(fields["approach"], (*path, "approach"))
         name = target.value if isinstance(target.value, str) else self._target(target, (*path, "to"))
         first = {key: node for key, node in rest.items() if key not in _OF_THE_TARGET}
         first["to"] = _relative(target, name, offset, frame)
         first |= _zone(fields["approach"])
-        last = _relative(target, "here", back, frame) if self._names.waits(name) else target
+        last = _relative(target, "here", -offset, frame) if self._names.waits(name) else target
         before = MovePart(_mapping(entry, first), _written_in((*path, "approach"), "zone", "frame"))
         ending = self._straight(fields, "approach", path, last, entry)
         return [*parts, self._with_defaults(before), ending]
@@ -132,21 +131,20 @@ class Parts:
             return law
         return _mapping(law, {"shape": law._replace(value=_FASTEST), **law.value})
 
-    def _offset(self, given: Node, path: _Path, sign: float) -> tuple[list[float | str], Node]:
+    def _offset(self, given: Node, path: _Path) -> tuple[np.ndarray, Node]:
         """Return how far from the target a straight part begins or ends, m, and along whose axes."""
-        fields = given.value if isinstance(given.value, dict) else {"distance": given}
+        fields, at = {"distance": given}, path
         if isinstance(given.value, dict):
             self._names.only(given, _STRAIGHT, path)
+            fields, at = given.value, (*path, "distance")
             if "distance" not in fields:
                 raise self._names.refused("`distance` is missing", path)
         try:
             distance = Number(_LENGTH, "", above=0.0).read(fields["distance"].plain(), self._context)
         except FlawError as error:
-            at = (*path, "distance") if isinstance(given.value, dict) else path
             raise self._names.refused(str(error), at, error.flaws[0][2]) from None
         axis = self._axis(fields.get("axis"), (*path, "axis"))
-        frame = fields.get("frame", given._replace(value="tool"))
-        return [written_number(float(x), _LENGTH) for x in sign * distance * axis], frame
+        return distance * axis, fields.get("frame", given._replace(value="tool"))
 
     def _axis(self, given: Node | None, path: _Path) -> np.ndarray:
         """Return the unit vector of an axis, (3,)."""
@@ -182,8 +180,9 @@ def _mapping(like: Node, fields: Mapping[str, Node]) -> Node:
     return like._replace(value=dict(fields), keys=None)
 
 
-def _relative(like: Node, name: str, xyz: list[float | str], frame: Node) -> Node:
-    """Return a target relative to a point."""
-    numbers = like._replace(value=[like._replace(value=x, keys=None) for x in xyz], keys=None)
+def _relative(like: Node, name: str, xyz: np.ndarray, frame: Node) -> Node:
+    """Return a target relative to a point, by so much, m."""
+    written = (written_number(x, _LENGTH) for x in xyz.tolist())
+    numbers = like._replace(value=[like._replace(value=x, keys=None) for x in written], keys=None)
     offset = _mapping(like, {"xyz": numbers})
     return _mapping(like, {"from": like._replace(value=name, keys=None), "offset": offset, "frame": frame})
