@@ -104,16 +104,7 @@ def _orders(groups: Sequence[Group]) -> list[int]:
 def _of_tool(
     group: Group, trajectory: Trajectory, local: Array, robot: Robot | None, motion: Array, last: Array | None
 ) -> Array:
-    """Return a group of `TOOL_COLUMNS`, shape (N, columns), in SI.
-
-    Args:
-        group: Which.
-        trajectory: Whose spans know which tool is on the flange.
-        local: Times from its start, s, shape (N,).
-        robot: Whose tool.
-        motion: q and as many of its derivatives as the group needs, SI, shape (N, orders, n).
-        last: Quaternion of the row before, (4,); None before the first.
-    """
+    """Return a group of `TOOL_COLUMNS`, (N, columns), of a motion (N, orders, n); `last` is a quaternion."""
     # a plan without these columns does not pay for the imports
     from trajcli.geometry.rotation import quaternion_from_matrix, without_jumps
     from trajcli.kinematics.forward import forward

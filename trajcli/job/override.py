@@ -112,17 +112,16 @@ def overridden(document: Document, settings: Sequence[Setting]) -> Document:
 
 def _refuse_keys_of_values(document: Document, setting: Setting) -> None:
     """Refuse a path through a name, a number or nothing."""
-    for depth in range(len(setting.path)):
-        node = document.node(setting.path[:depth])
+    path, words = setting.path, [str(step) for step in setting.path]
+    for depth in range(len(path)):
+        node = document.node(path[:depth])
         if node is None or isinstance(node.value, dict | list):
             continue
-        at, below = (".".join(map(str, steps)) for steps in (setting.path[:depth], setting.path[depth:]))
-        point = isinstance(node.value, str) and document.node(("points", node.value))
-        hint = (
-            f"it is a point: points.{node.value}.{below}=..." if point else f"write the whole of it: {at}=..."
-        )
+        hint = f"write the whole of it: {'.'.join(words[:depth])}=..." if depth else None
+        if isinstance(node.value, str) and document.node(("points", node.value)):
+            hint = f"it is a point: {'.'.join(['points', node.value, *words[depth:]])}=..."
         inside = f"would stand inside {node.text or 'an empty value'}, which holds no keys"
-        raise InputError(f"{setting.option}: '{setting.path[depth]}' {inside}", hint=hint if depth else None)
+        raise InputError(f"{setting.option}: '{words[depth]}' {inside}", hint=hint)
 
 
 def _patched(document: Document, setting: Setting) -> PatchedDocument:
