@@ -175,16 +175,10 @@ class ZoneAround:
         return at_ends, bound
 
     def _tool_rates(self, start: Array, speed: Array, rise: Array, lengths: Array) -> tuple[Array, Array]:
-        """Return bounds of |p''| and of |w| on intervals, each (P,).
+        """Return bounds of |p''| and of |w| on intervals (P,), from q, |q'| and |q''| (P, n) there.
 
         p'' is the sum of the columns of the Jacobian times q'', and of their changes: a column of a joint is
         turned by the joints before it, and by those behind it its lever is moved.
-
-        Args:
-            start: Joint values (P, n) at the beginning.
-            speed: Bounds of |q'|, (P, n).
-            rise: Of |q''|.
-            lengths: Of the intervals, s, (P,).
         """
         robot = self.robot
         links = np.linalg.norm(np.diff(link_poses(robot, start)[..., :3, 3], axis=1), axis=2)

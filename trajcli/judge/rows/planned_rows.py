@@ -315,7 +315,7 @@ class _Known:
     stamps: _Stamps
 
     def first_wrong(self, block: Array, local: Array, wrong: NDArray[np.intp]) -> int | None:
-        """Return the first of the rows `wrong` (k,) that differs at all times within the rounding of its stamp."""
+        """Return the first of the rows `wrong` (k,) that is none within the rounding of its stamp."""
         within = self.stamps.rounding + _ULPS * float(np.spacing(abs(self.stamps.last[1]) + local[-1]))
         near = np.stack([self._at(local[wrong] + shift) for shift in (-within, 0.0, within)])
         values = block[wrong]

@@ -118,11 +118,7 @@ def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> t
 
 
 def _rate(problem: WaypointProblem, point: int, order: int, line: Array, names: list[str]) -> float:
-    """Return the velocity (order 0) or acceleration (1) of the law at a point where joints give theirs.
-
-    Raises:
-        PlanningError: When what they give leaves the line.
-    """
+    """Return the velocity (order 0) or acceleration (1) of the law at a point where joints give theirs."""
     values, given = problem.states[point, :, order], problem.fixed[point, :, order]
     speaking = given & (line != 0)
     rate = float((values[speaking] / line[speaking]).mean()) if speaking.any() else 0.0
