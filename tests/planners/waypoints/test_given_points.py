@@ -123,6 +123,8 @@ def test_what_cannot_be_is_told_with_the_limit_of_its_joint_and_direction(
         require_possible(points(THREE, {(1, 1): given}), own_limits())
     (problem,) = caught.value.problems
     assert said in problem.text()
+    told = [problem.amounts[name] for name in ("value", "limit")]
+    assert [(each.order, each.joint) for each in told] == [(2 if given[0] is None else 1, 1)] * 2
 
 
 @pytest.mark.parametrize("given", [(1.5, 3.0), (-0.5, 3.0), (1.5, None), (None, 3.0), (None, -4.0)])
