@@ -28,7 +28,6 @@ from trajcli.planners.planner import Phase
 
 Control = Literal["position", "velocity"]
 
-_ALIKE = 1e-3  # relative: speeds there and back that are the same for ruckig, next to rest
 _STILL = 1e-9  # of the peak velocity: less counts as rest
 
 
@@ -148,6 +147,8 @@ _SHARES = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of acceleration and jerk
 _COMMON = 1e6  # times larger or smaller than 1 in SI: beyond it closed forms may overflow
 _SHORT = 1e-6  # of the longest phase: a shorter one may be what rounding leaves of none
 _LONG = 1e-4  # of the longest phase: rounding the ends of such a phase changes its constant by 1e-11
+_NEARLY, _SAME = 0.1, 1e-10  # relative: of states that are the same but for the direction of the velocity
+_LARGE = 1e-3  # in units of ruckig: of smaller ways and velocities its tolerances may hide more than `_SAME`
 _MARGINS = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
@@ -411,10 +412,13 @@ def _call_ruckig(
         [value / unit for value, unit in zip(values, units[1:], strict=True)]
         for values in problem.bounds.T.tolist()
     )
+    asked = _askable(problem, length_unit, velocity)
+    if asked is None:
+        return None
     wanted = ruckig.InputParameter(1)
     interfaces = ruckig.ControlInterface
-    wanted.control_interface = interfaces.Position if problem.control == "position" else interfaces.Velocity
-    wanted.current_position, wanted.target_position = [0.0], [problem.displacement / length_unit]
+    wanted.control_interface = interfaces.Position if asked.control == "position" else interfaces.Velocity
+    wanted.current_position, wanted.target_position = [0.0], [asked.displacement / length_unit]
     wanted.current_velocity = [initial[0] / velocity]
     wanted.current_acceleration = [initial[1] / acceleration]
     wanted.target_velocity = [_inside(problem.final[1] / velocity, lower[0], upper[0])]
@@ -425,15 +429,16 @@ def _call_ruckig(
     if duration is not None:
         wanted.minimum_duration = max(duration - waited, 0.0) / time_unit
     answer = ruckig.Trajectory(1)
-    if _comes_back_as_it_went(problem):
-        return None
     try:
         result = ruckig.Ruckig(1).calculate(wanted, answer)
     except (ruckig.RuckigError, ValueError):
         return None
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
         return None
-    return _profile(problem, answer, time_unit, units, lead)
+    profile = _profile(problem, answer, time_unit, units, lead)
+    if duration is None or asked.control == problem.control or _within(profile, problem.bounds):
+        return profile
+    return None  # ruckig bounds no velocity where it is controlled: the fastest changes it in one direction
 
 
 def _lead(problem: BoundaryProblem) -> PhaseChain | None:
@@ -447,13 +452,23 @@ def _lead(problem: BoundaryProblem) -> PhaseChain | None:
     return PhaseChain(initial, (math.nan,) * len(initial), *_apart(phases))
 
 
-def _comes_back_as_it_went(problem: BoundaryProblem) -> bool:
-    """Return whether a variable is back where it was, as fast, with the same acceleration: ruckig crashes."""
-    if problem.control != "position" or problem.displacement or not problem.initial[2]:
-        return False
-    speeds = problem.initial[1], problem.final[1]
-    alike = math.isclose(problem.initial[2], problem.final[2])
-    return alike and abs(speeds[0] + speeds[1]) <= _ALIKE * abs(speeds[0])
+def _askable(problem: BoundaryProblem, length: float, velocity: float) -> BoundaryProblem | None:
+    """Return what ruckig is asked for in units of length and velocity; None for nothing.
+
+    Where a variable comes back as it went, more of its cases hold than ruckig 0.19 has room for, and the
+    process ends. The fastest change to the opposite velocity and the same acceleration leads back by itself,
+    being the same backwards in time.
+    """
+    (_, speed, change), (_, back, last) = problem.initial, problem.final
+    if problem.control == "velocity" or not speed or not change:
+        return problem
+    way = abs(speed / change * speed)
+    unlike = max(abs(1 + back / speed), abs(problem.displacement) / (way or math.inf))
+    unlike = max(unlike, abs(1 - last / change))
+    if unlike <= _SAME:
+        return replace(problem, control="velocity")
+    small = way < _LARGE * length or abs(speed) < _LARGE * velocity
+    return None if small and unlike <= _NEARLY else problem
 
 
 def _inside(value: float, lower: float, upper: float) -> float:
