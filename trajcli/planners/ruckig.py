@@ -148,7 +148,7 @@ _COMMON = 1e6  # times larger or smaller than 1 in SI: beyond it closed forms ma
 _SHORT = 1e-6  # of the longest phase: a shorter one may be what rounding leaves of none
 _LONG = 1e-4  # of the longest phase: rounding the ends of such a phase changes its constant by 1e-11
 _NEARLY, _SAME = 0.1, 1e-10  # relative: of states that are the same but for the direction of the velocity
-_LARGE = 1e-3  # in units of ruckig: of smaller ways and velocities its tolerances may hide more than `_SAME`
+_LARGE = 1e-3  # in units of ruckig: of smaller lengths and velocities its tolerances hide more than `_SAME`
 _MARGINS = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
@@ -406,8 +406,7 @@ def _call_ruckig(
     lead = _lead(problem)
     initial = problem.initial[1:] if lead is None else (*lead.states[-1][1:], 0.0)
     waited = 0.0 if lead is None else lead.duration
-    units = [length_unit / time_unit**order for order in range(4)]
-    _, velocity, acceleration, _ = units
+    _, velocity, acceleration, _ = units = [length_unit / time_unit**order for order in range(4)]
     lower, upper = (
         [value / unit for value, unit in zip(values, units[1:], strict=True)]
         for values in problem.bounds.T.tolist()
@@ -416,8 +415,7 @@ def _call_ruckig(
     if asked is None:
         return None
     wanted = ruckig.InputParameter(1)
-    interfaces = ruckig.ControlInterface
-    wanted.control_interface = interfaces.Position if asked.control == "position" else interfaces.Velocity
+    wanted.control_interface = getattr(ruckig.ControlInterface, asked.control.capitalize())
     wanted.current_position, wanted.target_position = [0.0], [asked.displacement / length_unit]
     wanted.current_velocity = [initial[0] / velocity]
     wanted.current_acceleration = [initial[1] / acceleration]
@@ -430,15 +428,13 @@ def _call_ruckig(
         wanted.minimum_duration = max(duration - waited, 0.0) / time_unit
     answer = ruckig.Trajectory(1)
     try:
-        result = ruckig.Ruckig(1).calculate(wanted, answer)
+        if ruckig.Ruckig(1).calculate(wanted, answer) not in (ruckig.Result.Working, ruckig.Result.Finished):
+            return None
     except (ruckig.RuckigError, ValueError):
         return None
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        return None
     profile = _profile(problem, answer, time_unit, units, lead)
-    if duration is None or asked.control == problem.control or _within(profile, problem.bounds):
-        return profile
-    return None  # ruckig bounds no velocity where it is controlled: the fastest changes it in one direction
+    bounded = duration is None or asked is problem or _within(profile, problem.bounds)
+    return profile if bounded else None  # ruckig bounds no velocity where it controls the velocity
 
 
 def _lead(problem: BoundaryProblem) -> PhaseChain | None:
@@ -462,12 +458,12 @@ def _askable(problem: BoundaryProblem, length: float, velocity: float) -> Bounda
     (_, speed, change), (_, back, last) = problem.initial, problem.final
     if problem.control == "velocity" or not speed or not change:
         return problem
-    way = abs(speed / change * speed)
-    unlike = max(abs(1 + back / speed), abs(problem.displacement) / (way or math.inf))
-    unlike = max(unlike, abs(1 - last / change))
+    distance = abs(speed / change * speed)
+    missed = abs(problem.displacement) / (distance or math.inf)
+    unlike = max(missed, abs(1 + back / speed), abs(1 - last / change))
     if unlike <= _SAME:
         return replace(problem, control="velocity")
-    small = way < _LARGE * length or abs(speed) < _LARGE * velocity
+    small = distance < _LARGE * length or abs(speed) < _LARGE * velocity
     return None if small and unlike <= _NEARLY else problem
 
 

@@ -90,7 +90,7 @@ def _rows_and_loads(
     rows = rows_of_curve(plan.trajectory.curve, borders, when)
     if plan.loaded.robot.convention is None:
         return rows, []
-    from trajcli.player.loads import efforts_of_rows, loads_of, shows_efforts
+    from trajcli.player.marks import efforts_of_rows, loads_of, shows_efforts
 
     if shows_efforts(plan):
         rows = DrawnRows(rows.times, {**rows.values, EFFORT: efforts_of_rows(plan, rows)})

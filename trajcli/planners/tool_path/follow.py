@@ -16,7 +16,13 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.kinematics.following.follower import Follower, LostError, ReferenceAt, follower
+from trajcli.kinematics.following.follower import (
+    ExecutedPoses,
+    Follower,
+    LostError,
+    ReferenceAt,
+    follower,
+)
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance, probes, tolerance_ratio
 from trajcli.kinematics.following.tool_path import ToolPath
@@ -267,8 +273,6 @@ class FollowedPath:
         """The path as the tool follows it: with the turn that its targets leave free, where they do."""
         if self.path.orientation == "all":
             return self.path
-        from trajcli.kinematics.following.executed import ExecutedPoses
-
         return replace(self.path, poses=ExecutedPoses(self.path.poses, self.follower, self.coarse))
 
     def limited_by(self, tcp: ToolLimits) -> ToolPath:
