@@ -175,15 +175,9 @@ def _approaches(coefficients: Array, lengths: Array, limits: ApproachLimits) -> 
 def _piece_uses(
     distances: Array, lengths: Array, deceleration: Array, offset: Array, at_least: float | None = None
 ) -> tuple[Array, Array]:
-    """Return how much of their limits approaches use in each piece, and when, both of shape (w, m).
+    """Return how much of their limits approaches use in each piece, and when, (w, m).
 
-    Args:
-        distances: To the bounds ahead, polynomials (degree + 1, w, m), highest power first.
-        lengths: Of the pieces, shape (w,).
-        deceleration: Shape (m,).
-        offset: Shape (m,).
-        at_least: What uses less than that is not looked at closely; by default, what uses less than another
-            piece of the same column.
+    What uses less than `at_least`, by default than another piece of its column, is not looked at closely.
     """
     speeds = -derivative_coefficients(distances, 1)
     (fastest,) = critical_points(speeds, lengths, (0,))

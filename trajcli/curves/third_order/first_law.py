@@ -179,15 +179,8 @@ def _led_to(
     """Return speeds and accelerations that come near to a state as the offsets (k,) from it vanish.
 
     They come near to those of a constant acceleration that leads through the state: where it is slow, and
-    slows down or has just begun to move, its speed is another one soon.
-
-    Args:
-        state: Speed and acceleration where the way is zero.
-        offsets: From there, along s.
-        sign: 1 where the state is the first one, or -1.
-        length: Over which the speed is led away from it.
-        speed: Shape (k,).
-        acceleration: Shape (k,).
+    slows down or has just begun to move, its speed is another one soon. It is led away over `length`;
+    `sign` is 1 where the state is the first one, or -1.
     """
     x = np.minimum(np.abs(offsets) / length, 1.0)
     weight, slope = x**2 * (3.0 - 2.0 * x), sign * 6.0 * x * (1.0 - x) / length
