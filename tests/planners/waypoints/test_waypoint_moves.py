@@ -296,3 +296,25 @@ def test_a_jerk_that_differs_by_direction_bounds_the_fastest_by_its_larger_side(
     assert 0.5 < certificate.lower < faster < plan.trajectory.duration
     assert [event.kind for event in plan.events] == ["jerk_limit_both_ways"]
     assert "of j1 differs by direction" in plan.events[0].message
+
+
+@pytest.mark.parametrize(
+    ("limit", "jerk"), [(1e3, 20.0), (1e6, 20.0), (1e12, 20.0), (10.0, 2e-8), (1e12, 2e13)]
+)
+def test_limits_out_of_reach_do_not_matter(limit, jerk):
+    """Where jerk alone limits, times go with its third root; 1e6 beside 20 ended in a traceback."""
+    free = {"velocity": [100.0] * 3, "acceleration": [100.0] * 3, "jerk": [20.0] * 3}
+    wide = {"velocity": [limit] * 3, "acceleration": [limit] * 3, "jerk": [jerk] * 3}
+    expected, found = (plan_of({"waypoints": POINTS, "limits": limits}) for limits in (free, wide))
+    ratio = found.trajectory.duration / expected.trajectory.duration
+    assert ratio == pytest.approx((20.0 / jerk) ** (1 / 3), rel=1e-3)
+
+
+@pytest.mark.parametrize("speed", [3.0, -30.0])
+def test_limits_out_of_reach_from_a_start_in_motion(speed):
+    start = {"velocity": [speed] * 3, "acceleration": [0.5 * speed] * 3}
+    found = []
+    for velocity, acceleration in ((50.0, 80.0), (1e6, 1e6)):
+        limits = {"velocity": [velocity] * 3, "acceleration": [acceleration] * 3, "jerk": LIMITS["jerk"]}
+        found.append(plan_of({"waypoints": POINTS, "limits": limits}, start=start).trajectory.duration)
+    assert found[1] < 1.02 * found[0]

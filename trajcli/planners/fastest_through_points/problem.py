@@ -109,10 +109,29 @@ class WaypointProblem:
         Ruckig's tolerances are absolute. Such units change nothing else.
         """
         steps = np.abs(self.steps)
-        speeds = self.scales[:, 0]
-        typical = float((steps / speeds).max(axis=1).mean()) + float((self.scales[:, 1] / self.jerk).min())
+        speeds, changes = self.reachable().scales.T
+        typical = float((steps / speeds).max(axis=1).mean()) + float((changes / self.jerk).min())
         time = 2.0 ** round(math.log2(typical))
         return time, np.exp2(np.round(np.log2(speeds * time))).astype(np.float64)
+
+    def reachable(self) -> WaypointProblem:
+        """Return the problem without what of its limits no motion reaches in the time that stops would take.
+
+        Limits that stand for none would make units and scales of another size than the motion.
+        """
+        speeds, changes = np.abs(np.where(self.fixed, self.states, 0.0)).max(axis=0).T
+        (velocity, acceleration), steps = self.scales.T, np.abs(self.steps)
+        times = steps / velocity + 2 * np.sqrt(steps / acceleration) + np.cbrt(32 * steps / self.jerk)
+        braking = changes / self.jerk + speeds / acceleration + 2 * np.sqrt(speeds / self.jerk)
+        longest = 2 * float(np.maximum(times.max(axis=1), self.least).sum() + braking.max())
+        changes = changes + self.jerk * longest
+        speeds = (speeds + np.minimum(changes, acceleration) * longest)[:, None]
+        changes = changes[:, None]
+        return replace(
+            self,
+            velocity=np.clip(self.velocity, -speeds, speeds),
+            acceleration=np.clip(self.acceleration, -changes, changes),
+        )
 
     def scaled(self) -> WaypointProblem:
         """Return the problem in its units, each joint from zero."""

@@ -89,7 +89,9 @@ def search(
     along = _stopping if polyline is None else (lambda problem, stopping, best: polyline)
     begins = (_STARTS[0], along, *_STARTS[2:])[:starts]
     near = None if known is None else _scaled(problem, known)
-    found = _found(problem.scaled(), begins if near is None else (_from_best(8),), lower / time, near)
+    found = _found(
+        problem.reachable().scaled(), begins if near is None else (_from_best(8),), lower / time, near
+    )
     states = found.best.states * np.stack([lengths / time, lengths / time**2], axis=1)
     best = StateMotion(problem.inside(states), found.best.times * time)
     return Found(best, tuple(time * duration for duration in found.durations), found.stopping * time)
