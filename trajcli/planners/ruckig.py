@@ -147,8 +147,10 @@ _SHARES = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # of acceleration and jerk
 _COMMON = 1e6  # times larger or smaller than 1 in SI: beyond it closed forms may overflow
 _SHORT = 1e-6  # of the longest phase: a shorter one may be what rounding leaves of none
 _LONG = 1e-4  # of the longest phase: rounding the ends of such a phase changes its constant by 1e-11
-_NEARLY, _SAME = 0.1, 1e-10  # relative: of states that are the same but for the direction of the velocity
-_LARGE = 1e-3  # in units of ruckig: of smaller lengths and velocities its tolerances hide more than `_SAME`
+_SAME = 1e-10  # relative: of states that are the same but for the direction of the velocity
+_HIDDEN = (
+    1e-11  # over velocity and acceleration in ruckig's units: so unlike are states that it takes for alike
+)
 _MARGINS = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
@@ -411,8 +413,7 @@ def _call_ruckig(
         [value / unit for value, unit in zip(values, units[1:], strict=True)]
         for values in problem.bounds.T.tolist()
     )
-    asked = _askable(problem, length_unit, velocity)
-    if asked is None:
+    if (asked := _askable(problem, units)) is None:
         return None
     wanted = ruckig.InputParameter(1)
     wanted.control_interface = getattr(ruckig.ControlInterface, asked.control.capitalize())
@@ -432,9 +433,9 @@ def _call_ruckig(
             return None
     except (ruckig.RuckigError, ValueError):
         return None
-    profile = _profile(problem, answer, time_unit, units, lead)
-    bounded = duration is None or asked is problem or _within(profile, problem.bounds)
-    return profile if bounded else None  # ruckig bounds no velocity where it controls the velocity
+    profile = _profile(asked, answer, time_unit, units, lead)
+    # ruckig bounds no velocity where it controls the velocity
+    return profile if not duration or asked is problem or _within(profile, problem.bounds) else None
 
 
 def _lead(problem: BoundaryProblem) -> PhaseChain | None:
@@ -448,23 +449,22 @@ def _lead(problem: BoundaryProblem) -> PhaseChain | None:
     return PhaseChain(initial, (math.nan,) * len(initial), *_apart(phases))
 
 
-def _askable(problem: BoundaryProblem, length: float, velocity: float) -> BoundaryProblem | None:
-    """Return what ruckig is asked for in units of length and velocity; None for nothing.
+def _askable(problem: BoundaryProblem, units: Sequence[float]) -> BoundaryProblem | None:
+    """Return what ruckig is asked for in units of the derivatives, None for nothing.
 
-    Where a variable comes back as it went, more of its cases hold than ruckig 0.19 has room for, and the
-    process ends. The fastest change to the opposite velocity and the same acceleration leads back by itself,
-    being the same backwards in time.
+    Ruckig 0.19 ends the process where a variable comes back as it went: it has no room for so many cases. The
+    fastest change to the opposite velocity and the same acceleration leads back, being the same backwards.
     """
-    (_, speed, change), (_, back, last) = problem.initial, problem.final
+    (start, speed, change), (end, back, last) = problem.initial, problem.final
     if problem.control == "velocity" or not speed or not change:
         return problem
-    distance = abs(speed / change * speed)
-    missed = abs(problem.displacement) / (distance or math.inf)
+    rounding = 4 * math.ulp(max(abs(start), abs(end)))
+    missed = max(abs(problem.displacement) - rounding, 0.0) / (abs(speed / change * speed) or math.inf)
     unlike = max(missed, abs(1 + back / speed), abs(1 - last / change))
     if unlike <= _SAME:
         return replace(problem, control="velocity")
-    small = distance < _LARGE * length or abs(speed) < _LARGE * velocity
-    return None if small and unlike <= _NEARLY else problem
+    hidden = _HIDDEN * (units[1] / abs(speed) + units[2] / abs(change))
+    return None if unlike <= min(0.1, hidden) else problem
 
 
 def _inside(value: float, lower: float, upper: float) -> float:

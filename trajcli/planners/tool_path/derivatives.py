@@ -16,7 +16,8 @@ _CLOSER, _HIGHEST, _BETWEEN = 4, 5, 9  # rounds, samples looked at closer in eac
 _EVEN = 1e-6  # of the first derivative, over the whole path: a turn that changes by less is even
 _SAFE = 1.0 + 1e-6  # times a peak that is looked for
 _SAMPLES = 257  # values of s at which the largest derivatives of the path are looked for
-_WITHIN = np.arange(1, 16) / 16  # parts of each piece at which they are, too: a corner may be short
+_SHORT = 4  # distances of samples: in shorter pieces they are looked for at
+_WITHIN = np.arange(1, 16) / 16  # parts of these, too
 
 
 @comparable
@@ -44,7 +45,9 @@ def path_derivatives(path: ToolPath) -> PathDerivatives:
     How a tool turns about what its targets leave free has its peaks anywhere: these are looked for closer.
     """
     breaks = path.breaks
-    within = (breaks[:-1, None] + np.diff(breaks)[:, None] * _WITHIN).ravel()
+    starts, lengths = breaks[:-1], np.diff(breaks)
+    short = lengths * (_SAMPLES - 1) < _SHORT * path.length
+    within = (starts[short, None] + lengths[short, None] * _WITHIN).ravel()
     s = distinct(np.concatenate([np.linspace(0.0, path.length, _SAMPLES), breaks, within]))
     first, second = _derivatives(path, s)
     turning, change = (largest_norm(rows[..., 3:]) for rows in (first, second))
