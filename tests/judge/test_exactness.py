@@ -120,3 +120,17 @@ def test_rows_at_a_period_of_many_digits_keep_limits_that_the_motion_has(seed: i
         }
         judgement = judged(motion, replace(unlimited(1), **bounds), interpolate="quintic")
         assert (judgement.verdict == "exceeded") == certain
+
+
+@pytest.mark.parametrize("count", [41, 75, 118])
+def test_rows_are_missing_at_a_period_of_many_digits(count: int) -> None:
+    """Where half of the rows are missing the interval may be off by as much as all others together."""
+    off, period = np.full(1, 0.5e-9), 0.004421159
+    for k in range(4, count // 2):
+        index = np.delete(np.arange(count), np.arange(k, k + count // 2))
+        t = np.round(period * index, 6)
+        q, resolution = np.round(period * index, 9)[:, None], Resolution(0.5e-6, off, off, off)
+        motion = RecordedMotion(t, q, *6 * [None], resolution, "rows")
+        for limit, certain in ((1.0, False), (0.999, True)):
+            bounds = replace(unlimited(1), velocity=np.array([[-limit, limit]]))
+            assert (judged(motion, bounds).verdict == "exceeded") == certain
