@@ -1,4 +1,4 @@
-"""Correlations of parameters by hand, and when released parameters explain more than noise lets them."""
+"""Noise, deviations and correlations of parameters, and when released ones explain more than noise lets them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from trajcli.kinematics.calibration import uncertainty
 from trajcli.kinematics.calibration.fit import Fit, Options, _Problem
@@ -108,15 +109,19 @@ def test_variances_are_by_kind_or_of_both_where_one_has_no_freedom() -> None:
     rows[:, 1], rows[:, 4] = np.sqrt(0.2), np.sqrt(0.05)  # sums of squares: 2 and 0.5
     fit = cast("Any", SimpleNamespace(weights=np.full(10, 0.8)))
 
-    def found(counts: tuple[int, int], leverage: list[float], stated: object = None) -> Any:
+    def found(counts: tuple[int, int], taken: tuple[int, int], stated: object = None) -> Any:
+        left = np.zeros((10, 6, sum(taken)))  # each column takes one coordinate that is no residual
+        at = [(k, 0) for k in range(taken[0])] + [(k, 3) for k in range(taken[1])]
+        for column, (row, coordinate) in enumerate(at):
+            left[row, coordinate, column] = 1.0
         measured = cast("Any", SimpleNamespace(counts=counts, deviations=stated))
-        return uncertainty._variances(rows, np.array(leverage), fit, measured)
+        return uncertainty._variances(rows, left.reshape(60, -1), fit, measured)
 
-    np.testing.assert_allclose(found((30, 30), [4.0, 2.0]), [2.0 / 20, 0.5 / 22])
-    np.testing.assert_allclose(found((30, 5), [4.0, 3.6]), [2.0 / 20, 2.5 / 20.4])  # 0.4 left: taken together
-    np.testing.assert_allclose(found((5, 30), [4.2, 4.0]), [2.5 / 19.8, 0.5 / 20])
-    assert found((5, 5), [3.8, 3.9]) is None
-    np.testing.assert_allclose(found((5, 5), [3.8, 3.9], (1e-3, 1e-3)), [1.0, 1.0])
+    np.testing.assert_allclose(found((30, 30), (4, 2)), [2.0 / 20, 0.5 / 22])
+    np.testing.assert_allclose(found((30, 3), (4, 2)), [2.0 / 20, 2.5 / 20.4])  # 0.4 left: taken together
+    np.testing.assert_allclose(found((3, 30), (2, 4)), [2.5 / 20.4, 0.5 / 20])
+    assert found((5, 5), (4, 4)) is None
+    np.testing.assert_allclose(found((5, 5), (4, 4), (1e-3, 1e-3)), [1.0, 1.0])
 
 
 class LinearMeasurements:
@@ -154,20 +159,27 @@ def fit_of(made: LinearMeasurements, span: np.ndarray, combinations: object = ()
     return cast("Any", SimpleNamespace(**parts))
 
 
+def restricted(logarithms: np.ndarray, rows: np.ndarray, residuals: np.ndarray, counts: np.ndarray) -> float:
+    """Return the restricted likelihood of variances by kind (2,), its logarithm times -2, but for a constant."""
+    inverse = np.exp(-logarithms)[np.arange(len(rows)) % 6 // 3]
+    normal = rows.T @ (inverse[:, None] * rows)
+    missed = residuals - rows @ np.linalg.solve(normal, rows.T @ (inverse * residuals))
+    return float(counts @ logarithms + np.linalg.slogdet(normal)[1] + inverse @ missed**2)
+
+
 def by_pseudo_inverse(made: LinearMeasurements, fit: Fit, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the covariance of the parameters, and the variance of either kind of residual, row by row."""
+    """Return the covariance of the parameters, and the likeliest variance of either kind of residual."""
     weights = (made.weights(length) * np.sqrt(fit.weights)[:, None]).ravel()
     rows = (made.jacobian.reshape(len(weights), -1) * weights[:, None]) @ fit.span
-    inverse = np.linalg.pinv(rows)
-    taken, squares = np.diag(rows @ inverse), (made.residuals.ravel() * weights) ** 2
-    kind = np.arange(len(weights)) % 6 // 3
-    variances = np.ones(2)
-    if made.deviations is None:
-        freedom = [made.counts[k] * fit.weights.mean() - taken[kind == k].sum() for k in range(2)]
-        variances = np.array(
-            [squares[kind == k].sum() / freedom[k] if made.counts[k] else 0.0 for k in range(2)]
-        )
+    inverse, residuals = np.linalg.pinv(rows), made.residuals.ravel() * weights
+    variances, counts = np.ones(2), np.array(made.counts) * fit.weights.mean()
+    if made.deviations is None and all(made.counts):
+        least = minimize(restricted, np.zeros(2), (rows, residuals, counts), "Nelder-Mead", tol=1e-10)
+        variances = np.exp(least.x)
+    elif made.deviations is None:
+        variances *= (residuals**2).sum() / (counts.sum() - rows.shape[1])
     mapped = fit.span @ inverse
+    kind = np.arange(len(weights)) % 6 // 3
     return mapped @ np.diag(variances[kind]) @ mapped.T, variances
 
 
@@ -186,10 +198,26 @@ def test_deviations_are_those_of_the_pseudo_inverse(
     fit = fit_of(made, span)
     found = uncertainty.uncertainty(fit, cast("Any", made), NAMES, Options(length))
     wanted, variances = by_pseudo_inverse(made, fit, length)
-    np.testing.assert_allclose(cast("Any", found.deviations), np.sqrt(np.diag(wanted)), rtol=1e-9)
+    np.testing.assert_allclose(cast("Any", found.deviations), np.sqrt(np.diag(wanted)), rtol=1e-6)
     noise = [np.sqrt(variances[0]), np.sqrt(variances[1]) / length]
     known = [None if stated or not made.counts[k] else pytest.approx(noise[k]) for k in range(2)]
     assert list(found.noise) == known
+
+
+@pytest.mark.parametrize("length", [0.01, 100.0])
+def test_noise_is_told_whatever_scale_was_fitted_with(length: float) -> None:
+    """Of 48 numbers by 20 parameters: the kind that counts more brings its noise into residuals of the other."""
+    names, found = [ArmParameter(f"p{k}", "theta", k) for k in range(20)], []
+    for seed in range(40):
+        made = LinearMeasurements(8, 20, seed)
+        weights = made.weights(length).ravel()
+        rows = made.jacobian.reshape(48, 20) * weights[:, None]
+        noise = made.residuals.ravel() * weights
+        made.residuals = ((noise - rows @ np.linalg.lstsq(rows, noise)[0]) / weights).reshape(8, 6)
+        fit = fit_of(made, np.eye(20))
+        fit.weights[:] = 1.0
+        found.append(uncertainty.uncertainty(fit, cast("Any", made), names, Options(length)).noise)
+    np.testing.assert_allclose(np.mean(np.square(cast("Any", found)), axis=0), [1.0, 0.03**2], rtol=0.2)
 
 
 def test_what_no_combination_leaves_open_has_a_deviation() -> None:

@@ -1,8 +1,8 @@
 """Uncertainty of calibrated parameters: standard deviations and correlations.
 
 Where deviations of the measurements are not given, those of position and of orientation are estimated, each
-from its own residuals and the freedoms that the fit leaves to them: so the deviations of the parameters hold
-whatever scale between lengths and angles was fitted with.
+from its own residuals and the freedoms that a fit leaves to them which weighs both by these estimates: so the
+deviations of the parameters hold whatever scale between lengths and angles was fitted with.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ WORTH_MENTIONING = 0.9
 
 _MOST_CORRELATIONS = 10
 _FREEDOM = 0.5  # of one kind of residual, below which both kinds are taken together
+_ROUNDS = 20  # of weighing both kinds anew
 
 
 @comparable
@@ -67,8 +68,7 @@ def uncertainty(
     weighted = residuals * weights
     rows = (jacobian * weights[:, :, None]).reshape(-1, len(parameters)) @ fit.span
     left, values, right = np.linalg.svd(rows, full_matrices=False)
-    leverage = np.square(left).sum(axis=1).reshape(-1, 2, 3).sum(axis=(0, 2))
-    variances = _variances(weighted, leverage, fit, measurements)
+    variances = _variances(weighted, left, fit, measurements)
     if variances is None:
         return Uncertainty((None,) * len(parameters), (None, None), ())
     kinds = np.repeat(np.arange(2), 3)
@@ -94,17 +94,39 @@ def _undetermined(
     return {share.parameter for shares in seen.combinations for share in shares}
 
 
-def _variances(weighted: Array, leverage: Array, fit: Fit, measurements: Measurements) -> Array | None:
-    """Return the variances (2,) of weighted residuals of position and orientation; None without freedom."""
+def _variances(weighted: Array, left: Array, fit: Fit, measurements: Measurements) -> Array | None:
+    """Return the variances (2,) of weighted residuals of position and orientation; None without freedom.
+
+    Args:
+        weighted: The residuals, shape (N, 6).
+        left: An orthonormal basis of what the parameters do to them, shape (6 N, r).
+        fit: Of the parameters.
+        measurements: To which it was fitted.
+
+    Source: Koch, Parameter Estimation and Hypothesis Testing in Linear Models (1999), section 3.6, for the
+    estimation of components of variance by iteration.
+    """
     if measurements.deviations is not None:
         return np.ones(2)
-    squares = np.square(weighted).reshape(-1, 2, 3).sum(axis=(0, 2))
-    share = float(fit.weights.mean())
-    freedom = np.array(measurements.counts) * share - leverage
+    basis, parts = left.reshape(-1, 2, 3, left.shape[1]), weighted.reshape(-1, 2, 3)
+    grams, pulls = np.einsum("nkci,nkcj->kij", basis, basis), np.einsum("nkci,nkc->ki", basis, parts)
+    squares = np.square(parts).sum(axis=(0, 2))
+    counts = np.array(measurements.counts) * float(fit.weights.mean())
+    freedom = counts - np.trace(grams, axis1=1, axis2=2)
     if freedom.sum() <= _FREEDOM:
         return None
     pooled = squares.sum() / freedom.sum()
-    return np.asarray(np.where(freedom > _FREEDOM, squares / np.maximum(freedom, _FREEDOM), pooled))
+    variances = np.where(freedom > _FREEDOM, squares / np.maximum(freedom, _FREEDOM), pooled)
+    for _ in range(_ROUNDS):
+        if variances.min() <= 0.0 or freedom.min() <= _FREEDOM:
+            break
+        rows = grams / variances[:, None, None]
+        inverse = np.linalg.inv(rows.sum(axis=0))
+        change = inverse @ (pulls / variances[:, None]).sum(axis=0)
+        left_over = np.maximum(squares - 2.0 * pulls @ change + grams @ change @ change, 0.0)
+        freedom = counts - np.einsum("kij,ji->k", rows, inverse)
+        variances = np.where(freedom > _FREEDOM, left_over / np.maximum(freedom, _FREEDOM), variances)
+    return np.asarray(variances)
 
 
 def _noise(
