@@ -87,6 +87,20 @@ def test_masses_up_to_the_largest_verify_from_outside(job: str, at: int | None, 
     assert [part for part in few((1 + 1e-6, 1.01, 20, 2), 2) if verifies(outside, part * largest)] == []
 
 
+OTHER_TOOL = EMPTY.replace(
+    "limits:", "tools: {long: {xyz: [300, 0, 0]}, bare: {}}\ntool: long\nlimits:"
+).replace("moves:\n", "moves:\n  - {attach: {mass: MASS}}\n  - {tool: bare}\n")
+
+
+@pytest.mark.parametrize("at", [None, 3])
+def test_what_is_attached_keeps_its_place_on_the_flange_behind_a_change_of_the_tool(at: int | None) -> None:
+    """At 300 mm from the flange, and not at the tcp of the second tool."""
+    found = payload_capacity(job_from_text(OTHER_TOOL.replace("MASS", "0.5")), at)
+    assert found.moves == (0, 1, 2, 3, 4)
+    assert verifies(OTHER_TOOL, float(found.mass or 0))
+    assert not verifies(OTHER_TOOL, float(found.mass or 0) * (1 + 1e-6))
+
+
 LIFTING = """
 version: 1
 robot: ur5e

@@ -88,17 +88,21 @@ def payload_capacity(
 
 
 def _carriers(loaded: LoadedJob, at: int | None) -> dict[int, Payload]:
-    """Return what is carried in the moves that count, by their index; of the mass that the job says."""
+    """Return what is carried in the moves that count, by their index; of the mass that the job says.
+
+    What is attached keeps its place on the flange: the tcp of another tool sees it elsewhere.
+    """
     moves = loaded.job.moves
     known = f"its moves are 0 to {len(moves) - 1}"
     if at is not None and not 0 <= at < len(moves):
         raise InputError(f"--at {at}: {loaded.name} has no such move", hint=known)
-    carried: list[Payload | None] = []
-    for planner in moves:
-        carried.append(planner.carried_after(carried[-1] if carried else None))
-    held = {index: payload for index, payload in enumerate(carried) if payload is not None}
-    if at is not None and carried[at] is not None:
-        return {index: payload for index, payload in held.items() if payload is carried[at]}
+    held, taken, robot = dict[int, Payload](), dict[int, int](), loaded.robot
+    for index, planner in enumerate(moves):
+        robot = planner.equipped(robot)
+        if robot.payload is not None:
+            held[index], taken[index] = robot.payload, taken.get(index - 1, index)
+    if at in held:
+        return {index: payload for index, payload in held.items() if taken[index] == taken[at]}
     if at is not None:
         if moves[at].handles:
             raise InputError(f"--at {at}: nothing is carried there", hint="name a move, or what attaches")
