@@ -51,6 +51,20 @@ def test_a_line_that_begins_in_motion_takes_what_ruckig_takes(speed, jerk):
     assert best * (1 - 1e-9) <= duration <= 1.001 * best
 
 
+@pytest.mark.parametrize(
+    ("velocity", "acceleration", "jerk", "start", "end"),
+    [
+        ((-0.694615, 0.130033), (-2.07999, 0.837957), 240.537, (0.0415536, -0.0467556), 0.083127),
+        ((-0.29386, 0.308), (-0.4325, 2.011), 148.5, (0.12869, 0.0), 0.03565),
+    ],
+)
+def test_a_limit_that_control_points_alone_pass_is_found_kept(velocity, acceleration, jerk, start, end):
+    """Next to an end in motion, where nothing can be slowed down as a whole."""
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[1.0]], [[0.0]]]))
+    bounds = np.array([velocity]), np.array([acceleration]), both([jerk])
+    judged(path, *bounds, start=start, end=(end, 0.0))
+
+
 @pytest.mark.parametrize("factor", few([1, 0.02, 0.005], 2))
 @pytest.mark.parametrize(("start", "end"), few([(0.9, 0.0), (0.0, 0.5), (0.2, 0.9), (1.0, 1.0)], 2))
 def test_a_line_of_seven_joints_between_motions(factor, start, end):

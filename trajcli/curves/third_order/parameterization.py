@@ -222,10 +222,12 @@ class _Search:
         """Lower limits in the intervals that exceed them until little is left."""
         lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, min(self.slower, _SETTLED))
         best, idle = self.stretch, 0
-        for _ in range(steps):
+        for step in range(steps):
             if _stretch(self.excess) <= 1.0 + enough or (self.hasty and idle > _IDLE):
                 break
-            stubborn = ((self.excess > _STUBBORN) & (self.lowered > _STUBBORN)).any(axis=0)
+            # what is left after many steps may be the bound's own: it is nearer in shorter pieces
+            passed = 1.0 if step and step % _SETTLING == 0 else _STUBBORN
+            stubborn = ((self.excess > passed) & (self.lowered > passed)).any(axis=0)
             if stubborn.any() and self.law.lengths.size + stubborn.sum() <= most:
                 if self.rests:
                     self.lowered[:, stubborn] = 1.0
