@@ -168,6 +168,7 @@ def test_a_last_row_off_the_grid_is_no_other_grid():
         (motion(101, 0.01, "b.csv", start=0.5), "from 0.5 s on"),
         (motion(2, 0.02, "b.csv"), "0.02 s"),
         (motion(1, 0.02, "b.csv", start=0.5), "b.csv has one row, at 0.5 s"),
+        (table({"t": [0.0, 0.3, 0.9], "q1": [0, 0, 0]}, "b.csv"), "b.csv has 3 rows from 0 s to 0.9 s"),
     ],
 )
 def test_other_grids_are_refused(b, words):
@@ -176,6 +177,19 @@ def test_other_grids_are_refused(b, words):
     assert words in str(caught.value)
     assert "--resample" in caught.value.problems[0].hint
     assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("b", "words"),
+    [
+        (motion(start=5.0, file="b.csv"), "no row of a.csv lies inside the times of b.csv"),
+        (table({"t": [0.0, 0.2, 0.2], "q1": [0, 0, 0]}, "b.csv"), "the times of b.csv do not increase"),
+    ],
+)
+def test_resampling_is_not_advised_where_it_is_refused(b, words):
+    with pytest.raises(InputError, match=words) as caught:
+        exactly(motion(), b)
+    assert "--resample" not in caught.value.problems[0].hint
 
 
 def test_times_within_their_tolerance_are_those_of_one_grid():

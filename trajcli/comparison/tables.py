@@ -155,6 +155,9 @@ def _common_row_count(a: Table, b: Table, times: tuple[Array, Array], slack: flo
             return count
         if times[short][-1] < times[1 - short][count - 1]:
             return count - 1
+    _require_increasing(a, times[0])
+    _require_increasing(b, times[1])
+    _rows_inside(a, b, *times)
     raise InputError(
         f"the rows stand at different times: {_grid(a.file, times[0])}, {_grid(b.file, times[1])}; "
         f"row {apart[0]} is at {times[0][apart[0]]:.12g} s and {times[1][apart[0]]:.12g} s",
@@ -165,7 +168,11 @@ def _common_row_count(a: Table, b: Table, times: tuple[Array, Array], slack: flo
 def _grid(file: str, times: Array) -> str:
     if times.size < 2:
         return f"{file} has one row, at {times[0]:.12g} s"
-    return f"{file} has one every {float(np.median(np.diff(times))):.6g} s from {times[0]:.12g} s on"
+    gaps = np.diff(times)
+    period = float(np.median(gaps))
+    if gaps.max() - gaps[:-1].min(initial=gaps.max()) > 0.01 * period:  # the last row may stand off the grid
+        return f"{file} has {times.size} rows from {times[0]:.12g} s to {times[-1]:.12g} s"
+    return f"{file} has one every {period:.6g} s from {times[0]:.12g} s on"
 
 
 def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:

@@ -122,6 +122,7 @@ WRONG_FILES = {
     "": "points.csv is empty (a CSV begins with",
     "q1,q2\n": "points.csv:1:1: the file has no rows",
     "q1\n0\n1\n": "points.csv: no column for j2 (call it q2 (SI) or q2_deg)",
+    "q1,q2,q3_deg\n0,0,0\n": "points.csv: q3_deg is the column of joint 3, robot has 2",
     "q1,q2\n0,0\n1\n": "points.csv:3:1: the line has 1 values, expected 2",
     "q1,q2\n0,0\n1,x\n": "points.csv:3:3: q2 is 'x', expected a finite number",
     "q1,q2\n0,0\n1,nan\n": "q2 is 'nan', expected a finite number",

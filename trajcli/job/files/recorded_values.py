@@ -84,11 +84,17 @@ def joint_columns(table: Table, robot: Robot) -> Array:
     """Return the values of all joints (N, n), rad or m, from columns such as q1, q2_deg or a joint's name.
 
     Raises:
-        InputError: When a joint has no column or two, one of another unit, or a value that no robot has.
+        InputError: When a joint has no column or two, one of another unit, or a value that no robot has; or
+            when there is a column of a joint beyond the last.
     """
+    known = [(name, column) for name in table.names if (column := _column(name, robot)) is not None]
+    for name, column in known:
+        if (column.joint or 0) >= len(robot.joints):
+            text = f"{table.file}: {name} is the column of joint {(column.joint or 0) + 1}"
+            raise InputError(f"{text}, {robot.name} has {len(robot.joints)}")
     positions = np.empty((len(table.columns), len(robot.joints)))
     for joint in range(len(robot.joints)):
-        positions[:, joint] = _joint(table, robot, joint)
+        positions[:, joint] = _joint(table, robot, joint, known)
     if max(positions.max(initial=0.0), -positions.min(initial=0.0)) > LARGEST_POSITION:
         most = f"{LARGEST_POSITION:g} rad or m"
         raise InputError(
@@ -108,11 +114,11 @@ def _refuse_other_times(table: Table) -> None:
         )
 
 
-def _joint(table: Table, robot: Robot, joint: int) -> Array:
-    """Return the values of a joint, rad or m."""
+def _joint(table: Table, robot: Robot, joint: int, known: list[tuple[str, Column]]) -> Array:
+    """Return the values of a joint, rad or m, from the known columns of joints."""
     name, kind = robot.joint_names[joint], robot.joint_types[joint]
     unit = "mm" if kind == "prismatic" else "deg"
-    candidates = [(n, c) for n in table.names if (c := _column(n, robot)) is not None and c.joint == joint]
+    candidates = [each for each in known if each[1].joint == joint]
     if not candidates:
         hint = f"call it q{joint + 1} (SI) or q{joint + 1}_{unit}"
         raise InputError(f"{table.file}: no column for {name}", hint=hint)
