@@ -202,6 +202,7 @@ def test_rows_between_rows_verify(words: tuple[str, ...], capfd: Capture) -> Non
 WRONG = [
     (("resample", "rows.csv", "--rate", "fast"), 2, "--rate expects rows per second, got 'fast'"),
     (("resample", "rows.csv", "--rate", "-5"), 2, "--rate expects rows per second"),
+    (("resample", "rows.csv", "--rate", "1e-320"), 2, "a number of at least 1e-12"),
     (("resample", "rows.csv", "--rate", "1e12"), 2, "is too high"),
     (("slice", "rows.csv", "--from", "soon"), 2, "--from expects seconds, got 'soon'"),
     (("slice", "rows.csv", "--from", "2"), 2, "--from 2: rows.csv goes from 0 s to 1 s"),

@@ -85,9 +85,10 @@ def test_resampled_rows_are_on_the_polynomial(tmp_path: Path) -> None:
         assert values is not None
         np.testing.assert_allclose(values[:, 0], expected[order], atol=1e-9)
     assert worst_deviation(read(path), found)[1] < 1e-9
-    coarse = resample(read(path), 1.0)
-    assert coarse.rows.t.tolist() == [0, 1]
-    assert worst_deviation(read(path), coarse)[1] < 1e-9
+    for rate in (1.0, 1e-9):  # at the second one the end stands within 1e-6 of a period from the first row
+        coarse = resample(read(path), rate)
+        assert coarse.rows.t.tolist() == [0, 1]
+        assert worst_deviation(read(path), coarse)[1] < 1e-9
 
 
 def sampled(path: Path, rate: float, decimals: int, duration: float = 2.0) -> Path:

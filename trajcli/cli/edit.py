@@ -93,7 +93,7 @@ def run_concat(options: ConcatCommand) -> int:
         found = join(found, motion)
     _check_continuity(motions[0], found)
     _write(found, options)
-    _say(options, f"{' + '.join(sources)}: joined, {_extent(found)}")
+    _say(options, f"{' + '.join(motion.rows.source for motion in motions)}: joined, {_extent(found)}")
     return 0
 
 
@@ -229,6 +229,6 @@ def _hertz(word: str) -> float:
         value = float(word)
     except ValueError:
         value = np.nan
-    if not np.isfinite(value) or value <= 0:
-        raise InputError(f"--rate expects rows per second, got '{word}'", hint="a number above 0")
+    if not 1e-12 <= value < np.inf:  # as in jobs
+        raise InputError(f"--rate expects rows per second, got '{word}'", hint="a number of at least 1e-12")
     return value

@@ -67,9 +67,10 @@ def resample(motion: EditedMotion, rate: float) -> EditedMotion:
     """
     t = motion.rows.t
     grid = UniformGrid(float(t[-1] - t[0]), rate, float(t[0]))
-    times = np.concatenate([stamps for stamps, _ in grid.blocks()])
+    # a grid of far too long a period has the end alone
+    times = np.concatenate([t[:1], *(stamps for stamps, _ in grid.blocks())])
     times[-1] = t[-1]
-    # no two of the times come to one row, but the last two
+    # no two of the times come to one row, but the first two and the last two
     return _at(motion, np.unique(_snapped(motion, times, _room(motion, (0.5 - _NEAR) / rate))))
 
 

@@ -211,7 +211,7 @@ def _ranges(motion: EditedMotion) -> list[tuple[slice, tuple[int, ...]]]:
     """Return the rows of moves, borders in both, and their indices; of moves that meet in motion together."""
     move = motion.rows.move
     if move is None:
-        hint = "leave --per-move out, or plan with `columns: [t, q, qd, qdd, move]`"
+        hint = "leave --per-move out, or plan CSV with `columns: [t, q, qd, qdd, move]`"
         raise InputError(f"{motion.rows.source} has no column `move`", hint=hint)
     borders = np.flatnonzero(np.diff(move)) + 1
     resting = [border for border in borders.tolist() if _rests(motion, border)]
