@@ -56,6 +56,16 @@ def test_a_job_that_does_not_verify_is_shown_and_exits_as_plan_does(
     assert b'"state":"violated"' in (folder / "view.html").read_bytes()
 
 
+def test_every_finding_is_said_where_the_worst_one_advises_it(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "two.yaml").write_text(TWO + "limits: {velocity: 1}\n")
+    assert "(and 1 more like it: --all)" in call(capfd, "view", "two.yaml", "-o", "view.html").err
+    every = call(capfd, "view", "two.yaml", "-o", "view.html", "--all").err
+    assert [f"the velocity of {name} reaches" in every for name in ("j1", "j2")] == [True, True]
+    assert "more like it" not in every
+
+
 def test_a_job_without_a_curve_has_no_page(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     done = call(
         capfd,

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from trajcli.cli.command import Command
 from trajcli.cli.options import (
+    EveryFinding,
     Json,
     Overrides,
     TopicName,
@@ -82,9 +83,7 @@ class PlotCommand(Command):
     ] = []
     override: Overrides = []
     quiet: Annotated[bool, option("--quiet -q", "Do not say what was written.")] = False
-    every: Annotated[bool, option("--all", "Every finding, not only the worst of each move and kind.")] = (
-        False
-    )
+    every: EveryFinding = False
 
 
 class ViewCommand(Command):
@@ -121,6 +120,7 @@ class ViewCommand(Command):
         ),
     ] = 0.5
     override: Overrides = []
+    every: EveryFinding = False
 
 
 class ProfilesCommand(Command):

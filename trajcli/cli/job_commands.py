@@ -11,6 +11,7 @@ from trajcli.cli.command import Command, CommandLine
 from trajcli.cli.options import (
     ColumnMap,
     Consumer,
+    EveryFinding,
     FieldName,
     FileUnits,
     JobErrors,
@@ -82,9 +83,7 @@ class PlanCommand(CommandLine):
     si: Annotated[
         bool, option("--si", "Rows in rad and m, whatever units the job has: plain column names.")
     ] = False
-    every: Annotated[bool, option("--all", "Every finding, not only the worst of each move and kind.")] = (
-        False
-    )
+    every: EveryFinding = False
     errors: JobErrors = "text"
 
 

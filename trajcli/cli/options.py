@@ -110,6 +110,7 @@ ArmUnits = Annotated[
 ]
 Si = Annotated[bool, option("--si", "Numbers in rad and m, whatever units the robot's file has.")]
 Json = Annotated[bool, option("--json", "Print JSON for programs.")]
+EveryFinding = Annotated[bool, option("--all", "Every finding, not only the worst of each move and kind.")]
 Joints = Annotated[
     list[str], argument("Q...", "A value for each joint, in the units of the robot's file; - reads a CSV.")
 ]

@@ -39,9 +39,12 @@ def run_view(options: ViewCommand) -> int:
     jobs = [not holds_motion(name) and options.robot is None for name in options.sources]
     if options.override and not any(jobs):
         raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
+    every = options.every or options.errors == "json"
     by = options.robot or next((n for n, job in zip(options.sources, jobs, strict=True) if job), None)
     shown = [
-        _shown_job(name, options) if job else _shown_file(name, by, options.output, options.meshes)
+        _shown_job(name, options, every)
+        if job
+        else _shown_file(name, by, options.output, options.meshes, every=every)
         for name, job in zip(options.sources, jobs, strict=True)
     ]
     return _written(shown, options)
@@ -91,7 +94,7 @@ def _written(shown: Sequence[_Shown], options: ViewCommand) -> int:
     return 0
 
 
-def _shown_job(name: str, options: ViewCommand) -> _Shown:
+def _shown_job(name: str, options: ViewCommand, every: bool) -> _Shown:
     from trajcli.job.read import files_of, load_job
     from trajcli.output.delivery.delivered import plan_of
     from trajcli.player.scene import scene_of_plan
@@ -106,11 +109,13 @@ def _shown_job(name: str, options: ViewCommand) -> _Shown:
     from trajcli.output.report import verification_error
 
     return _Shown(
-        scene, f"{loaded.name}: not verified", lambda: verification_error(plan, every=False).problems
+        scene, f"{loaded.name}: not verified", lambda: verification_error(plan, every=every).problems
     )
 
 
-def _shown_file(name: str, robot: str | None, output: str | None, meshes: float) -> _Shown:
+def _shown_file(
+    name: str, robot: str | None, output: str | None, meshes: float, *, every: bool = False
+) -> _Shown:
     from trajcli.player.recorded import scene_of_file
 
     _check_inputs_stay(output, [("the rows of", name)])
@@ -122,7 +127,7 @@ def _shown_file(name: str, robot: str | None, output: str | None, meshes: float)
         return _Shown(scene, said, None)
     from trajcli.cli.judged_file import problems_of
 
-    return _Shown(scene, said, lambda: problems_of(checked, every=False))
+    return _Shown(scene, said, lambda: problems_of(checked, every=every))
 
 
 def _checked_or_reason(source: ByteSource, robot: str) -> CheckedFile | str:
