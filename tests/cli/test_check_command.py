@@ -69,6 +69,16 @@ def test_the_table_has_the_worst_first(capfd: pytest.CaptureFixture[str]) -> Non
 
 
 @pytest.mark.parametrize("form", ["junit", "sarif", "github"])
+def test_a_document_says_why_the_only_file_cannot_be_judged(
+    form: str, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "rows.csv").write_text("t,q1\n0,0\n1,nan\n")
+    code, out, err = call(capfd, "check", tmp_path / "rows.csv", "-r", "ur5e", "--format", form)
+    assert (code, err) == (2, "")
+    assert "expected a finite number" in out
+
+
+@pytest.mark.parametrize("form", ["junit", "sarif", "github"])
 def test_findings_for_continuous_integration(capfd: pytest.CaptureFixture[str], form: str) -> None:
     code, out, _ = call(capfd, "check", GOAL, *BY_UR10E, "--format", form)
     assert code == 1

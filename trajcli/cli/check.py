@@ -47,9 +47,11 @@ def _delivered(loaded: LoadedJob, profile: str | None, form: str) -> Plan:
 def run_check(options: CheckCommand) -> int:
     """Judge files and print what was found; return 0 when nothing is certainly wrong, else 1 or worse.
 
+    A document for a service of CI has the errors of files that cannot be judged, too.
+
     Raises:
-        InputError: When the only file is no trajectory, or options do not fit.
-        FileError: When the only file cannot be read.
+        InputError: When options do not fit, or the only file is no trajectory, for people or as JSON.
+        FileError: When the only file cannot be read, likewise.
     """
     files = [file for name in options.files for file in motion_files(name)]
     form, alone, code = _form(options, files), files == options.files[:1], 0
@@ -58,7 +60,7 @@ def run_check(options: CheckCommand) -> int:
         try:
             checked, beside = _checked_file(file, options)
         except TrajcliError as error:
-            if alone:
+            if alone and form in ("table", "json"):
                 raise
             code = max(code, error.exit_code)
             found.append({"file": file, **error_as_json(error)})
