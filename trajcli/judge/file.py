@@ -19,6 +19,7 @@ from trajcli.kinematics.robot import Robot
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of, refuse_job
 from trajcli.streams.recorded.column_roles import note_of_unread
+from trajcli.streams.recorded.column_units import parse_units
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
 from trajcli.units import Quantity, Units, amount_text, joint_quantity
 
@@ -123,7 +124,7 @@ def check_file(
     robot = given.robot
     declared = None if plan is not None else stated_units(options.job or options.robot or "")
     motion = _opened(opened, options, given, declared)
-    shown = _shown_units(options, given)
+    shown = _said_units(options, given.shown or given.units)
     consumer = _consumer_of(options.profile, given)
     requirements = _requirements(options, given, shown, consumer)
     if consumer is not None and options.interpolate is None and consumer().profile.interpolation is not None:
@@ -357,9 +358,8 @@ def _given(options: CheckOptions) -> _Given:
     if options.limits is None:
         return _Given(sheet.robot, sheet.units, ())
     from trajcli.job.limits_file import with_limits_file
-    from trajcli.queries.arm import parse_units
 
-    units = parse_units(options.units or "")  # as in a job: rad and m, unless somebody says others
+    units = _said_units(options, Units())  # as in a job: rad and m, unless somebody says others
     robot, events = with_limits_file(sheet.robot, options.limits, units)
     say = partial(amount_text, joint_types=robot.joint_types, units=units)
     conceded = tuple(event.text(say) for event in events if event.concedes)
@@ -389,11 +389,10 @@ def _conceded(loaded: LoadedJob) -> tuple[str, ...]:
     return tuple(event.text(loaded.say) for event in loaded.events if event.concedes)
 
 
-def _shown_units(options: CheckOptions, given: _Given) -> Units:
-    from trajcli.queries.arm import parse_units
-
-    units = given.shown or given.units
-    return units if options.units is None else parse_units(options.units, units)
+def _said_units(options: CheckOptions, default: Units) -> Units:
+    """Return the units that somebody says for the file; what is left open is as by default."""
+    said = parse_units(options.units)
+    return Units(said.angle or default.angle, said.length or default.length)
 
 
 def _carrying(given: _Given, options: CheckOptions) -> _Given:
@@ -407,7 +406,7 @@ def _carrying(given: _Given, options: CheckOptions) -> _Given:
     from trajcli.job.inline import inline_payload
     from trajcli.job.limits import own_efforts
 
-    payload = inline_payload(options.payload, "--payload", _shown_units(options, given))
+    payload = inline_payload(options.payload, "--payload", _said_units(options, given.shown or given.units))
     robot = replace(given.robot, payload=payload)
     if not robot.limits.has_effort:
         robot = replace(robot, limits=replace(robot.limits, effort=own_efforts(robot)))
