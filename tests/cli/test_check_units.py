@@ -61,7 +61,15 @@ def test_units_of_a_robot_file_and_of_the_user(units, options, scale, file, tmp_
 def test_the_unit_of_time_may_be_said_beside_that_of_angles(tmp_path, capfd):
     (tmp_path / "in.csv").write_text("time,q1,q2\n0,0,0\n500,1,0\n")
     said = call(
-        capfd, "check", tmp_path / "in.csv", "-r", "planar2r", "--units", "rad,ms", "--limits", "{velocity: 1}"
+        capfd,
+        "check",
+        tmp_path / "in.csv",
+        "-r",
+        "planar2r",
+        "--units",
+        "rad,ms",
+        "--limits",
+        "{velocity: 1}",
     )
     assert "2 rad/s" in said.out, said.err
     assert said.code == 1
