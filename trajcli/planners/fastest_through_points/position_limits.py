@@ -80,12 +80,14 @@ def room(problem: WaypointProblem, times: Array, states: Array) -> Room:
     one = _OneJoint(problem)
     for k, j in np.argwhere(_near(problem, times)).tolist():
         pair = np.concatenate([states[k, j], states[k + 1, j]])
-        distance[k, j] = (one.extremes(k, j, times[k], pair) - problem.position[j]) * [1, -1]
-        for c in range(4):
-            step = np.zeros(4)
-            step[c] = sizes[j, c]
-            after, before = (one.extremes(k, j, times[k], pair + sign * step) for sign in (1, -1))
-            slopes[k, j, :, c] = (after - before) / (2 * _DIFFERENCE)
+        here = one.extremes(k, j, times[k], pair)
+        if not np.isfinite(here).all():
+            continue
+        distance[k, j] = (here - problem.position[j]) * [1, -1]
+        for c, step in enumerate(np.diag(sizes[j])):
+            sides = [sign * (one.extremes(k, j, times[k], pair + sign * step) - here) for sign in (1, -1)]
+            known = [side for side in sides if np.isfinite(side).all()]  # beyond limits there is no motion
+            slopes[k, j, :, c] = np.mean(known, axis=0) / _DIFFERENCE if known else 0.0
     return Room(distance, slopes)
 
 
@@ -117,10 +119,10 @@ class _OneJoint:
         self._problem = problem
         self._solver, self._answer = ruckig.Ruckig(1), ruckig.Trajectory(1)
         self._wanted = ruckig.InputParameter(1)
-        self._errors = (ruckig.RuckigError, ValueError)
+        self._errors, self._working = (ruckig.RuckigError, ValueError), ruckig.Result.Working
 
     def extremes(self, segment: int, joint: int, duration: float, pair: Array) -> Array:
-        """Return the smallest and the largest position; those of the points where there is no motion."""
+        """Return the smallest and the largest position; not numbers where there is no motion."""
         problem, wanted, one = self._problem, self._wanted, slice(joint, joint + 1)
         set_limits(wanted, problem.velocity[one], problem.acceleration[one], problem.jerk[one])
         wanted.current_position = problem.points[segment, one].tolist()
@@ -129,9 +131,9 @@ class _OneJoint:
         wanted.target_velocity, wanted.target_acceleration = [float(pair[2])], [float(pair[3])]
         wanted.minimum_duration = float(duration)
         with suppress(*self._errors):
-            self._solver.calculate(wanted, self._answer)
-            profile = self._answer.profiles[0][0]
-            return _extremes(
-                profile.p[0], profile.v[0], profile.a[0], zip(profile.t, profile.j, strict=False)
-            )
-        return np.sort(problem.points[segment : segment + 2, joint])
+            if self._solver.calculate(wanted, self._answer) == self._working:
+                profile = self._answer.profiles[0][0]
+                brake = profile.brake
+                phases = [*zip(brake.t, brake.j, strict=True), *zip(profile.t, profile.j, strict=True)]
+                return _extremes(float(problem.points[segment, joint]), *pair[:2].tolist(), phases)
+        return np.full(2, np.nan)

@@ -90,6 +90,8 @@ def state_times(problem: WaypointProblem, states: Array, together: Array | None 
     trial = np.clip(pairs + moves * sizes, *_box(problem))
     steps = np.broadcast_to(problem.steps, trial.shape[:3])
     times = alone_times(problem, steps, trial)
+    known = np.isfinite(times)  # beyond the limits there is none: then the other side alone says it
+    trial, times = np.where(known[..., None], trial, trial[0]), np.where(known, times, times[0])
     spans = np.stack([(trial[1 + 2 * k] - trial[2 + 2 * k])[..., k] for k in range(4)], axis=2)
     changes = np.stack([times[1 + 2 * k] - times[2 + 2 * k] for k in range(4)], axis=2)
     spans = spans / np.concatenate([scales, scales], axis=1)
