@@ -212,6 +212,14 @@ def test_straight_keeps_to_the_polyline():
     assert "j1" in problem.text() or "j2" in problem.text()
 
 
+def test_a_polyline_of_no_length_lets_nothing_move():
+    still = {**CASE, "waypoints": [POINTS[0], POINTS[0]]}
+    start = {"velocity": [0.0, 0.2, 0.0]}
+    (problem,) = refusal(PlanningError, case=still, straight=True, start=start)
+    assert (problem.joint, "0.2 rad/s" in problem.text()) == ("j2", True)
+    plan_of(still, start=start)
+
+
 IMPOSSIBLE = {
     "start too fast": ({"start": {"velocity": [1.5, 0, 0]}}, "j1", "at its start"),
     "point too fast": ({"points": {1: {"velocity": {"j2": 2.5}}}}, "j2", "at point 1"),

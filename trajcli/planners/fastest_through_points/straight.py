@@ -95,12 +95,6 @@ def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> t
     points = problem.points[first : last + 1]
     line = points[-1] - points[0]
     along, _ = _on_line(points)
-    moving = line != 0
-    bounds = [bounds_along(line, limit)[None] for limit in (problem.velocity, problem.acceleration)]
-    jerk, loosest = (
-        (each[moving] / np.abs(line[moving])).min(keepdims=True)
-        for each in (problem.jerk, problem.jerk * problem.looser)
-    )
     states, fixed = np.zeros((len(points), 1, 2)), np.zeros((len(points), 1, 2), dtype=bool)
     fixed[[0, -1]] = True
     for k, order in np.argwhere(problem.fixed[first : last + 1].any(axis=1)).tolist():
@@ -109,6 +103,12 @@ def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> t
         if rate and first + k in (first, last) and 0 < first + k < problem.segments:
             raise _moves_at_turn(problem.states[first + k, :, order], first + k, order + 1, names)
         states[k, 0, order] = rate
+    moving = line != 0
+    bounds = [bounds_along(line, limit)[None] for limit in (problem.velocity, problem.acceleration)]
+    jerk, loosest = (
+        (each[moving] / np.abs(line[moving])).min(keepdims=True)
+        for each in (problem.jerk, problem.jerk * problem.looser)
+    )
     least = problem.least[first:last]
     free = np.array([[-np.inf, np.inf]])
     law = WaypointProblem(
