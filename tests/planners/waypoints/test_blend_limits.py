@@ -52,12 +52,13 @@ def test_times_that_are_found_keep_the_smaller_of_limit_and_own_acceleration(
     assert largest(made) == pytest.approx(used, rel=1e-6)
 
 
+@pytest.mark.parametrize("blends", [{}, {"blend_durations": [0.2, 0.3, 0.35, 0.25]}, {"blend_durations": 3}])
 @pytest.mark.parametrize("ends", ["centred", "inside"])
-def test_a_duration_is_that_of_the_whole_motion_with_its_blends(ends: str) -> None:
-    """The first and the last blend last differently, and with them all times keep their proportions."""
-    limits = {"velocity": 1, "acceleration": [3, 1]}
-    free = untimed(limits, end_blends=ends)
-    long = untimed(limits, end_blends=ends, duration=9)
+def test_a_duration_is_that_of_the_whole_motion_with_its_blends(ends: str, blends: dict[str, object]) -> None:
+    """Ends may have other blends, or too little room for them; with them all times keep their proportions."""
+    limits = {"velocity": 1, "acceleration": [9, 7] if blends else [3, 1]}
+    free = untimed(limits, end_blends=ends, **blends)
+    long = untimed(limits, end_blends=ends, **blends, duration=9)
     assert long.trajectory.duration == pytest.approx(9, rel=1e-12)
     factor = 9 / free.trajectory.duration
     np.testing.assert_allclose(curve_of(long).breaks, factor * curve_of(free).breaks, rtol=1e-9, atol=1e-9)

@@ -135,5 +135,6 @@ class _OneJoint:
                 profile = self._answer.profiles[0][0]
                 brake = profile.brake
                 phases = [*zip(brake.t, brake.j, strict=True), *zip(profile.t, profile.j, strict=True)]
-                return _extremes(float(problem.points[segment, joint]), *pair[:2].tolist(), phases)
+                begin = float(problem.points[segment, joint]), float(pair[0]), float(pair[1])
+                return _extremes(*begin, phases)
         return np.full(2, np.nan)

@@ -252,8 +252,7 @@ class Blends(ThroughPoints):
             points, self._durations(points), robot, bounds, self.end_blends, exactly=self.exactly
         )
         if self.duration:
-            outside = durations[[0, -1]].sum() / 2 if self.end_blends == "centred" else 0.0
-            factor = self.duration / (times[-1] + outside)
+            factor = self.duration / self._motion(points, times, durations, robot).curve.duration
             return times * factor, durations * factor
         return times, durations
 
