@@ -21,6 +21,8 @@ _INSIDE = 0.999999  # of the bounds: states on the edge have no motion at all fo
 _SPEEDS, _ACCELERATIONS = 7, 5  # of the first grid
 _LONGER = 3.0  # times as large they are in accelerations, which matter less
 _SLOW = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 0.01, 0.03)  # speeds of the first grid between rest and the next one
+_SLOW_SHARES = np.array([0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8])  # times cbrt(jerk * distance^2)
+_BUILT_UP = np.array([-0.9, -0.6, 0.0, 0.6, 0.9])  # of what jerk builds up from rest: edges hold a search
 _NEAR = 4.0  # times its speed: as far a slow state may be changed
 _REST = 1e-12  # of squares of joint velocities: a zone is not entered slower
 _FINE = 2.0**-26  # of the largest speed: the grid of speeds, between whose points those behind a zone lie
@@ -38,12 +40,14 @@ class BorderNode:
         leads: Whether a path leads to it, along which an acceleration was built up.
         goes_on: Whether one goes on from it.
         given: The only state that it may have, (2,); None where it may have others.
+        distance: Of s, between it and the corner.
     """
 
     bounds: BoundsAbout
     leads: bool
     goes_on: bool
     given: Array | None = None
+    distance: float = 0.0
 
     @cached_property
     def _sizes(self) -> tuple[float, float]:
@@ -83,7 +87,18 @@ class BorderNode:
         speeds = np.append(np.linspace(0.0, 1.0, _SPEEDS), _SLOW)[:, None] * top
         changes = np.append(np.linspace(-largest, largest, _ACCELERATIONS), 0.0)
         pairs = np.stack(np.broadcast_arrays(speeds, changes), axis=2).reshape(-1, 2)
-        return without_repeats(self.inside(pairs))
+        return without_repeats(self.inside(np.concatenate([pairs, self._slow_states()])))
+
+    def _slow_states(self) -> Array:
+        """Return states of the slow laws that jerk lets turn on the way to the corner, and back, (N, 2)."""
+        top, largest = self._sizes
+        if not largest:
+            return np.zeros((0, 2))
+        jerk = float(self.bounds(np.zeros((1, 2)))[0, 5])
+        speeds = _SLOW_SHARES * math.cbrt(jerk * self.distance**2)
+        speeds = speeds[speeds < _SLOW[-1] * top][:, None]
+        pairs = np.broadcast_arrays(speeds, _BUILT_UP * np.sqrt(2 * jerk * speeds))
+        return np.stack(pairs, axis=2).reshape(-1, 2)
 
     def around(self, state: Array, size: float, angle: float) -> Array:
         """Return a state (2,), first, and states around it, (N, 2)."""

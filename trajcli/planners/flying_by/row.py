@@ -36,6 +36,7 @@ def backwards(row: ChainRow) -> ChainRow:
             node.goes_on,
             node.leads,
             None if node.given is None else node.given * [1.0, -1.0],
+            node.distance,
         )
         for node in reversed(row.nodes)
     ]
@@ -110,7 +111,11 @@ def _border(chain: FlyByChain, number: int, course: Course, eased: float, *, lea
     def bounds(states: Array) -> Array:
         return _tighter(slowed(along(states / [tempo, tempo**2]), tempo), inside(states))
 
-    return BorderNode(_same_everywhere(bounds) if course.uniform else bounds, leads=leads, goes_on=not leads)
+    about, distance = (
+        _same_everywhere(bounds) if course.uniform else bounds,
+        course.length - s if leads else s,
+    )
+    return BorderNode(about, leads=leads, goes_on=not leads, distance=distance)
 
 
 def _same_everywhere(bounds: BoundsAbout) -> BoundsAbout:
