@@ -156,6 +156,8 @@ def test_a_job_written_out_is_the_same_plan(tmp_path):
         ("x,y\n1,2\n", {"csv": "poses.csv"}, "no column z"),
         ("x,x_mm,y,z\n1,2,3,4\n", {"csv": "poses.csv"}, "two columns for x: x and x_mm"),
         ("x,y,z,qw,qx\n1,2,3,1,0\n", {"csv": "poses.csv"}, "no column qy, qz"),
+        ("x,y,z,rx,ry,rz\n1,2,3,1,0,0\n", {"csv": "poses.csv"}, "this file has 'rx'"),
+        ("x,y,z,Yaw_deg\n1,2,3,1\n", {"csv": "poses.csv"}, "this file has 'Yaw_deg'"),
         (
             HEADER + "0.4,0.1,0.3,1,1,0,0\n",
             {"csv": "poses.csv"},

@@ -17,6 +17,7 @@ from trajcli.language.recorded import Recorded, RecordedPoses
 from trajcli.streams.table import Table, read_csv
 
 _OF_TIME = re.compile(r"(t|time|timestamp|secs?|seconds)([ _\[(].*)?")
+_OF_TURN = re.compile(r"(r[xyz]|rpy|roll|pitch|yaw|rot|rotvec|quat|quaternion|q[wxyz])([ _\[(].*)?")
 
 
 def read_recording(path: str, document: Document, robot: Robot) -> Recorded:
@@ -187,10 +188,21 @@ def _length(table: Table, name: str) -> Array:
     return np.asarray(table.column(found[0][0]) * found[0][1])
 
 
+def _refuse_other_turns(table: Table) -> None:
+    """Refuse an orientation under other names: the tool would keep its own, and nobody would notice."""
+    other = next((name for name in table.names if _OF_TURN.fullmatch(name.lower())), None)
+    if other is not None:
+        raise InputError(
+            f"{table.file}: orientations stand in the columns qw, qx, qy, qz; this file has '{other}'",
+            hint="write them so; or remove it: the orientation is then kept",
+        )
+
+
 def _quaternions(table: Table) -> Array | None:
     """Return unit quaternions (m, 4), w first; None where there are no such columns."""
     known = [name for name in _QUATERNION if name in table.names]
     if not known:
+        _refuse_other_turns(table)
         return None
     if len(known) < len(_QUATERNION):
         lacking = ", ".join(name for name in _QUATERNION if name not in known)
