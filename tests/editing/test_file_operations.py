@@ -91,6 +91,14 @@ def test_resampled_rows_are_on_the_polynomial(tmp_path: Path) -> None:
         assert worst_deviation(read(path), coarse)[1] < 1e-9
 
 
+def test_columns_that_are_left_out_are_named_all(tmp_path: Path) -> None:
+    others = [f"signal.glue{i}" for i in range(16)]
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    first.write_text("t,q1_deg\n0,0\n1,1\n")
+    second.write_text(f"t,q1_deg,{','.join(others)}\n1,1{',0' * 16}\n2,3{',1' * 16}\n")
+    assert join(read(first), read(second)).notes == (f"columns that are left out: {', '.join(others)}",)
+
+
 def sampled(path: Path, rate: float, decimals: int, duration: float = 2.0) -> Path:
     """Write rows of a quintic at a rate, stamps with some decimals."""
     t = np.append(np.arange(round(duration * rate, 6) // 1) / rate, duration)

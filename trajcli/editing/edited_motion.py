@@ -15,6 +15,7 @@ from trajcli.frozen import frozen
 from trajcli.judge.reconstruction import reconstruct
 from trajcli.kinematics.robot import JointType
 from trajcli.streams.decimals import DECIMALS
+from trajcli.streams.recorded.column_roles import note_of_unread
 from trajcli.streams.recorded_motion import (
     MotionFile,
     RecordedMotion,
@@ -209,4 +210,6 @@ def _whole(file: MotionFile) -> EditedMotion:
             f"{file.source}: the time stamp of row {row} is {after:.9g} s, that before it {before:.9g} s",
             hint="stamps must increase; `trajcli check` lists all that is wrong with the stamps",
         )
-    return EditedMotion(rows, file.written_columns(), file.format, file.notes)
+    lost = tuple(f"columns that are left out: {', '.join(names)}" for names in (file.unread,) if names)
+    others = (note for note in file.notes if note not in note_of_unread(file.unread))
+    return EditedMotion(rows, file.written_columns(), file.format, (*lost, *others))

@@ -137,7 +137,7 @@ def join(first: EditedMotion, second: EditedMotion) -> EditedMotion:
         name: np.concatenate([values[:-1], second.quantities[name]])
         for name, values in first.quantities.items()
     }
-    move, notes = None, _step(first, second)
+    move, notes = None, (*second.notes, *_step(first, second))
     if a.move is not None and b.move is not None:
         parts = not shift and a.move[-1] == b.move[0]
         later = 0 if parts else int(a.move.max()) + 1 - int(b.move.min())
