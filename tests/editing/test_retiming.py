@@ -49,6 +49,23 @@ def verdict(path: Path, arm: Path) -> str:
     return check_file(str(path), CheckOptions(robot=str(arm))).judgement.verdict
 
 
+def test_knots_far_apart_are_made_faster_up_to_their_limits(tmp_path: Path) -> None:
+    """Between rests a cubic over distance 1 in T reaches 6 / T^2; whoever goes too fast does not jump."""
+    source, arm = tmp_path / "knots.csv", robot(tmp_path / "arm.yaml", "velocity: 9, acceleration: 8")
+    source.write_text("t,q1,qd1\n0.0,0.0,0.0\n1.0,1.0,0.0\n2.0,0.0,0.0\n")
+    _, stretch = retimed(source, arm, fastest=True)
+    assert stretch.factor == pytest.approx(0.75**0.5, rel=2e-4)
+    assert stretch.binding is not None
+    assert stretch.binding.kind == "acceleration"
+
+
+def test_what_no_time_mends_is_said_at_the_time_of_the_file(tmp_path: Path) -> None:
+    source, arm = tmp_path / "late.csv", robot(tmp_path / "arm.yaml", "position: [-1, 1]")
+    source.write_text("t,q1\n110.0,0.0\n111.0,2.0\n112.0,0.0\n")
+    with pytest.raises(VerificationError, match="at t = 111 s"):
+        retimed(source, arm)
+
+
 @pytest.mark.parametrize("fastest", [False, True])
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_the_closed_form_for_each_order(order: int, fastest: bool, tmp_path: Path) -> None:

@@ -112,12 +112,15 @@ def _what_limits(robot: Robot, *, tool: bool) -> tuple[object, ...]:
 
 
 def _judge_of(requirements: Requirements, *, strict: bool) -> Judge:
-    """Return what judges rows: as `trajcli check` does, or strictly where rounding is small."""
+    """Return what judges rows: as `trajcli check` does, or strictly where rounding is small.
+
+    The strict one is for other times of rows whose columns agree: a jump in them is more than limits allow.
+    """
 
     def judge(rows: RecordedMotion) -> Finding | None:
         wrong = [f for f in judge_motion(lambda: (rows,), requirements).findings if _counts(f, strict=strict)]
         for finding in wrong:
-            if finding.kind not in STRETCHABLE:
+            if not strict and finding.kind not in STRETCHABLE:
                 hint = finding.hint or "another time of the motion does not help"
                 text, joint = finding.text(), finding.joint
                 raise VerificationError(
@@ -137,13 +140,12 @@ def _counts(finding: Finding, *, strict: bool) -> bool:
 
 
 def _part(rows: RecordedMotion, part: slice) -> RecordedMotion:
-    """Return some rows, from t = 0 on."""
+    """Return some rows."""
     names = (*ORDERS, "tau", "move")
     values: dict[str, Any] = {
         name: None if (found := getattr(rows, name)) is None else found[part] for name in names
     }
-    t = rows.t[part]
-    return replace(rows, t=t - t[0], **values)
+    return replace(rows, t=rows.t[part], **values)
 
 
 def _smallest(
@@ -154,6 +156,7 @@ def _smallest(
     Whether the motion keeps them as it is, is left to its rounding, as `trajcli check` does.
     """
     broken, low, most = judge(rows), 1.0, _SLOWEST
+    rows = replace(rows, t=rows.t - rows.t[0])  # stamps of far times have fewer digits
     if broken is None:
         most = 1.0
         if not fastest:
