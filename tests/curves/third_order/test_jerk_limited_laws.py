@@ -13,6 +13,8 @@ from trajcli.curves.operations import reverse
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.third_order import parameterization
 from trajcli.curves.third_order.convex_step import faster
+from trajcli.curves.third_order.curved_paths import rounded_polyline
+from trajcli.curves.third_order.interior_point import ChainProgram
 from trajcli.curves.third_order.parameterization import jerk_limited_time_optimal
 from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
 
@@ -147,6 +149,31 @@ def test_every_corner_is_a_stop_between_motions_from_rest_to_rest():
     at_rest = motion.trajectory.evaluate_orders(motion.stop_times, (0, 1, 2))
     np.testing.assert_allclose(at_rest[:, 0], points[1:3], atol=1e-9)
     np.testing.assert_allclose(at_rest[:, 1:], 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("length", few([1e-8, 1e-6], 1))
+def test_a_corner_that_is_hardly_rounded_takes_little_longer_than_a_stop(length):
+    """Where the first law is a thousand times too slow as a whole, or its nodes are nearly one."""
+    corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    path, _ = rounded_polyline(np.array([0.0, 1.0, 2.0]), corner, np.array([0.0, length, 0.0]))
+    motion = jerk_limited_time_optimal(path, both([3.0, 3.0]), both([8.0, 8.0]), both([60.0, 60.0]))
+    assert motion.law.duration <= 1.01 * 2.0 * ruckig_duration(1.0, 3.0, 8.0, 60.0)
+
+
+@pytest.mark.full
+def test_a_tight_bend_does_not_slow_down_all_the_rest():
+    """Between two points next to each other, where the first law passes its limits by far."""
+    points = np.array([[0.3, 1.2], [0.5, 1.3], [0.5001, 1.2999], [0.9, 1.25], [1.0, 2.0]])
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    motion = judged(spline(s, points), both([3.0, 3.0]), both([8.0, 8.0]), both([60.0, 60.0]))
+    assert motion.law.duration < 1.55
+
+
+def test_a_program_without_a_solution_ends_where_rounding_does():
+    """Of one unknown p in 1 / sqrt(1 + p) that shall be less than -1.5."""
+    one = np.array([1.0, 0.0, 0.0, 0.0]).reshape(4, 1, 1)
+    found = ChainProgram(one, np.ones((1, 1)), one, np.full((1, 1), -1.5)).minimum(1e-6)
+    assert -1.0 <= found[0, 0] < -0.99
 
 
 def test_a_loose_limit_of_jerk_costs_next_to_nothing():

@@ -19,7 +19,7 @@ _MANY = 64  # breaks of a section between two stops: with more, a node at each i
 _NARROWEST = 1e-8  # of the duration of a section: rounding is all that a narrower window would show
 _WIDEST = 0.3  # likewise: a wider window would leave nothing of the law
 _SEARCHED = 8  # samples between two nodes, among which the times of breaks are looked up
-_NEWTON = 3  # steps after that
+_NEWTON = 12  # steps after that
 _SLOWEST = 0.3  # of the speed at an end: an acceleration there is not followed to less
 _REST = (0.0, 0.0)
 

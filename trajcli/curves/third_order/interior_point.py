@@ -22,7 +22,7 @@ _LEAST_SLACK = 0.05  # of a limit, to begin with
 _GAP = 0.2  # between the objective and its bound, to begin with
 _FEASIBLE = 1e-7  # of a limit: a row passed by less is kept
 _PINNED = 1e-9  # on the diagonal: unknowns that no row knows stay zero
-_ROUNDING = 1e-13  # of the diagonal
+_ROUNDING = 1e-13  # of the diagonal, and of 1 + f p
 _TINY = 1e-300
 
 
@@ -64,7 +64,10 @@ class ChainProgram:
             centre = min(1.0, max(ahead, 0.0) / between) ** 3 * between / pairs.count
             dx, change = newton.step(centre, change)
             most = self._positive(x, dx)
-            x = x + min(pairs.reach(change, _TO_BORDER)[0], most) * dx
+            moved = x + min(pairs.reach(change, _TO_BORDER)[0], most) * dx
+            if not (1.0 + _times(self.samples, moved) > _ROUNDING).all():
+                break
+            x = moved
             pairs = pairs.ahead(change, _TO_BORDER, most)
         return x
 

@@ -35,6 +35,7 @@ _FIRST_GAP = 1e-3  # of the duration: what the first step may miss
 _FAR = 30.0  # times as long as it is: a first law that has to last so long is slowed down before any step
 _FIRST_STEPS, _MORE_STEPS = 12, 6  # on the first nodes and on the last ones
 _CHANGED = 3e-4  # of the duration: a step that changes less is the last one
+_FURTHER = 0.8  # of the duration: a step to less leads on, as from a law that is far too slow
 _STEADY = 0.7  # of the change before: a step that changes more leads nowhere
 _NEARLY = 1.5  # excess that is worth finer nodes
 _GAP, _LAST_GAP = 1e-4, 1e-5  # the same of those while nodes are refined, and of the last ones
@@ -46,6 +47,7 @@ _NEAR = 5e-3  # slowing that is so little is always worth another step
 _LOST = 1e-3  # of the duration, by estimate: finer nodes would not gain more
 _FEW_NEW = 0.02  # of the intervals: fewer new ones are not worth another step
 _LOWERED, _LOWERED_MORE = 1.1, 1.5  # times the excess that limits are lowered by
+_LOWEST = 1e6  # times that a limit is lowered by: where that does not help nothing does
 _PENALTY = 1.0  # of the duration, for passing a limit by its size at one place
 _STUBBORN = 1.005  # of a limit: where it is passed by more although it was lowered, nodes are missing
 _EXACT = 1e-10  # a limit exceeded by less is kept
@@ -188,6 +190,9 @@ class _Search:
         self._converge(_FIRST_STEPS, hopeless)
         if self.excess.max() > hopeless:
             raise self.unsettled()
+        if self.rests and self.excess.max() > _NEARLY:  # where much is passed, steps may lead nowhere
+            self._take(self.best.slowed(self.stretch))
+            self._converge(_FIRST_STEPS)
         for _ in range(_REFINEMENTS):
             lost = time_lost(self.law, self.limits, self.excess)
             duration = self.law.duration
@@ -201,17 +206,25 @@ class _Search:
         self._converge(_MORE_STEPS)
         return float(time_lost(self.law, self.limits, self.excess).sum())
 
+    @property
+    def _slowed_duration(self) -> float:
+        """How long the best law lasts once it keeps the limits."""
+        return self.best.duration * self.stretch
+
     def _converge(self, most: int, hopeless: float = np.inf) -> None:
         """Make steps until the duration settles or oscillates, and limits are nearly kept.
 
-        What is hopeless is left where a step does not halve the excess.
+        What is hopeless is left where a step does not halve the excess; a step that leads far does not count.
         """
-        last = np.inf
-        for _ in range(most):
-            before, passed = self.law.duration, float(self.excess.max())
+        last, left = np.inf, most
+        while left > 0:
+            before, passed, best = self.law.duration, float(self.excess.max()), self._slowed_duration
             self._step(_GAP)
             if float(self.excess.max()) > max(hopeless, 0.5 * passed):
                 break
+            if self.rests and self._slowed_duration < _FURTHER * best:
+                continue
+            left -= 1
             change = abs(self.law.duration - before) / before
             settled = change <= _CHANGED or change > _STEADY * last
             if settled and (self.rests or self.excess.max() <= _NEARLY):
@@ -233,6 +246,7 @@ class _Search:
                     self.lowered[:, stubborn] = 1.0
                 self._cut(np.where(stubborn, 2, 1))
             self.lowered = self.lowered * (1.0 + lowered * np.maximum(self.excess - 1.0, 0.0))
+            self.lowered = np.minimum(self.lowered, _LOWEST)
             self._step(_LAST_GAP)
             idle = 0 if self.stretch < best else idle + 1
             best = self.stretch
