@@ -122,6 +122,31 @@ def test_samples_from_standard_input(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (CSV, "stdin: not judged"),
+        (CSV.replace(",", ";"), "stdin: not judged"),
+        ("# rows\n" + CSV, "stdin: not judged"),
+        ('{"t":0,"q":[0,1]}\n{"t":1,"q":[1,0]}\n', "stdin: not judged"),
+        ("# two moves, both cubic\n" + TWO, "stdin: verified"),
+    ],
+)
+def test_standard_input_is_told_by_what_it_begins_with(
+    folder: Path, capfd: pytest.CaptureFixture[str], text: str, said: str
+) -> None:
+    done = call(capfd, "view", "-", "-o", "view.html", stdin=text)
+    assert (done.code, done.out) == (0, "")
+    assert done.err.startswith(said)
+    assert call(capfd, "plot", "-", "-o", "view.svg", stdin=text).code == 0
+
+
+def test_a_job_from_standard_input_is_not_read_twice(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    done = call(capfd, "view", "-", "rows.csv", "-o", "view.html", stdin=TWO)
+    assert done.code == 2
+    assert "standard input can be read once" in done.err
+
+
+@pytest.mark.parametrize(
     ("words", "text"),
     [
         (["view", "rows.csv", "-r", "ur5e", "-o", "v.html"], "expected q1 to q6 of UR5e"),

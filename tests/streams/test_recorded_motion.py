@@ -177,6 +177,7 @@ def test_our_own_names_are_si_whatever_the_job_says(tmp_path):
         ("t,time,q1", {}, "2 columns are times: t, time", "--columns t=t or --columns t=time"),
         ("q1,q2", {}, "no column is the time", "--columns t=NAME"),
         ("t,x,y", {}, "no columns are positions", "--columns q="),
+        ("t,a,b,a_vel,b_vel", {}, "no columns are positions", "q1=NAME,q2=NAME"),
         ("t,A1,A2", {}, "no columns are positions", "--columns q=A takes A1, A2 as positions"),
         ("t,q1,q3", {}, "q2 is missing", "numbered"),
         ("t,q2,q3", {}, "q1 is missing", "numbered"),

@@ -20,15 +20,12 @@ from trajcli.plots.choice import parse_quantities, split_names
 from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.reading import holds_motion, read_table
+from trajcli.streams.reading import is_job, read_table
 from trajcli.streams.whole_file import kind_of, refuse_overwriting, standard_output, whole_file
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import PlotCommand
     from trajcli.judge.file import CheckedFile
-
-_OF_JOBS = (".yaml", ".yml", ".json")
-_PEEKED = 4096  # bytes of standard input that are looked at
 
 
 def run_plot(options: PlotCommand) -> int:
@@ -125,7 +122,7 @@ def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[list[st
     """Return the jobs, at most two, and the files of rows."""
     if files.count("-") > 1:
         raise InputError("only one of the files can be standard input")
-    jobs = [name for name in files if _is_job(name)]
+    jobs = [name for name in files if is_job(name)]
     if len(jobs) > 2:
         hint = f"write the rows of the others, and plot these: trajcli plan {jobs[2]} -o rows.csv"
         raise InputError(f"two jobs can be plotted, and there are {len(jobs)}", hint=hint)
@@ -134,25 +131,6 @@ def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[list[st
             "--set overrides values of a job, and there is none", hint="leave it out, or name the job"
         )
     return jobs, [name for name in files if name not in jobs]
-
-
-def _is_job(name: str) -> bool:
-    """Return whether a file is a job: by its ending, else its first line; a pipe holds rows."""
-    ending = Path(name).suffix.lower()
-    if name != "-" and (ending in _OF_JOBS or holds_motion(name)):
-        return not holds_motion(name)
-    try:
-        if name == "-":
-            text = getattr(sys.stdin.buffer, "peek", bytes)(_PEEKED)
-        elif Path(name).is_file():
-            with Path(name).open("rb") as stream:
-                text = stream.read(_PEEKED)
-        else:
-            return not Path(name).exists()
-    except (OSError, AttributeError):  # who reads it says what is wrong
-        return False
-    first = text.lstrip().partition(b"\n")[0]
-    return b":" in first or b"," not in first
 
 
 def _stem(name: str) -> str:

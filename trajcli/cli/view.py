@@ -15,7 +15,7 @@ from trajcli.frozen import frozen
 from trajcli.player.page import check_page_name, page_of
 from trajcli.player.scene import BUDGET
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.reading import holds_motion
+from trajcli.streams.reading import holds_motion, is_job
 from trajcli.streams.whole_file import refuse_overwriting, standard_output, whole_file
 
 if TYPE_CHECKING:
@@ -36,11 +36,13 @@ def run_view(options: ViewCommand) -> int:
     if len(options.sources) > 2:
         hint = f"trajcli view {' '.join(options.sources[:2])}"
         raise InputError(f"a page shows one motion or two, and {len(options.sources)} are named", hint=hint)
-    jobs = [not holds_motion(name) and options.robot is None for name in options.sources]
+    jobs = [options.robot is None and is_job(name) for name in options.sources]
     if options.override and not any(jobs):
         raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
     every = options.every or options.errors == "json"
     by = options.robot or next((n for n, job in zip(options.sources, jobs, strict=True) if job), None)
+    if len(jobs) > 1 and [by, *options.sources].count("-") > 1:
+        raise InputError("standard input can be read once", hint="name the file of the job, or of the rows")
     shown = [
         _shown_job(name, options, every)
         if job

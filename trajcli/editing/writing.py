@@ -185,6 +185,7 @@ def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tu
         for name in ("qddd", EFFORT)
         if name in motion.quantities and (name, form.content) != (EFFORT, "log")
     ]
+    notes += ["the column move is left out: the format is written without it"] * motion.writes_moves
     knots = _knots(motion)
     if form.content == "knots":
         return WriteOptions(goal=lambda: Goal(motion.joint_names, knots)), tuple(notes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from codecs import BOM_UTF8
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,6 +28,8 @@ from trajcli.streams.whole_file import is_folder, is_special, kind_of, paths_bel
 _ALL_DECIMALS = 17  # of a float64
 ENDINGS_OF_ROWS = (".csv", ".txt", ".jsonl", ".mcap", ".npy", ".npz")
 _YAML = (".yaml", ".yml")
+_OF_JOBS = (*_YAML, ".json")
+_PEEKED = 4096  # bytes of standard input that are looked at
 _HEAD = 1 << 16  # bytes of a file that are looked at
 _JOINT_NAMES = re.compile(rb"^[ \t{-]*[\"']?joint_names[\"']?[ \t]*:", re.MULTILINE)
 _MCAP = b"\x89MCAP0\r\n"
@@ -196,6 +199,34 @@ def holds_motion(path: str | Path) -> bool:
     """Return whether a file is one of rows or messages by its name or first bytes, and no job."""
     ending = Path(str(path)).suffix.lower()
     return ending in ENDINGS_OF_ROWS or is_log(path) or (ending in _YAML and is_ros_message(path))
+
+
+def is_job(name: str) -> bool:
+    """Return whether a file is a job, no motion: by its ending or first bytes; one that is not there is."""
+    if name != "-" and (Path(name).suffix.lower() in _OF_JOBS or holds_motion(name)):
+        return not holds_motion(name)
+    try:
+        if name == "-":
+            head = getattr(sys.stdin.buffer, "peek", bytes)(_PEEKED)
+        elif Path(name).is_file():
+            with Path(name).open("rb") as stream:
+                head = stream.read(_PEEKED)
+        else:
+            return not Path(name).exists()
+    except (OSError, AttributeError):  # who reads it says what is wrong
+        return False
+    return not _begins_as_motion(head)
+
+
+def _begins_as_motion(head: bytes) -> bool:
+    """Return whether some first bytes are those of rows or messages; a job begins with a key and a colon."""
+    if any(pattern.match(head) for pattern, _ in _BY_FIRST_BYTES) or _JOINT_NAMES.search(head):
+        return True
+    lines = map(bytes.strip, head.removeprefix(BOM_UTF8).splitlines())
+    first = next((line for line in lines if line and not line.startswith((b"#", b"%", b"---"))), b"")
+    if b":" in first:
+        return first.startswith(b"{") and b"version" not in first
+    return len(re.split(rb"[,;\s]+", first)) > 1
 
 
 def motion_files(name: str) -> list[str]:

@@ -245,14 +245,12 @@ class _Assignment:
             return self._chosen["q"]
         if groups:
             self._refuse("the positions are ambiguous", groups)
-        hint = None
-        for quantity in ("qdd", "qd"):
+        named = self._listed(dict(enumerate(range(len(self._names)))))
+        hint = f"it has {named}; name them: --columns q=... or q1=NAME,q2=NAME"
+        for quantity in ("qd", "qdd"):  # where one letter says it, as in the axes A1 and A2
             for (_, stem), group in self._groups(quantity).items():
-                hint = hint or f"--columns q={stem} takes {self._listed(group)} as positions"
-        hint = (
-            hint
-            or f"it has {self._listed(dict(enumerate(range(len(self._names)))))}; name them: --columns q=..."
-        )
+                if len(stem.strip("_ .[(")) == 1:
+                    hint = f"--columns q={stem} takes {self._listed(group)} as positions"
         raise self._file.wrong("no columns are positions of joints, such as q1, q2", hint)
 
     def _refuse(self, message: str, groups: Mapping[tuple[str, str], ColumnGroup]) -> NoReturn:
