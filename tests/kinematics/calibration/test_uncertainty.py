@@ -177,7 +177,8 @@ def by_pseudo_inverse(made: LinearMeasurements, fit: Fit, length: float) -> tupl
         least = minimize(restricted, np.zeros(2), (rows, residuals, counts), "Nelder-Mead", tol=1e-10)
         variances = np.exp(least.x)
     elif made.deviations is None:
-        variances *= (residuals**2).sum() / (counts.sum() - rows.shape[1])
+        missed = residuals - rows @ (inverse @ residuals)
+        variances *= (missed**2).sum() / (counts.sum() - rows.shape[1])
     mapped = fit.span @ inverse
     kind = np.arange(len(weights)) % 6 // 3
     return mapped @ np.diag(variances[kind]) @ mapped.T, variances

@@ -95,16 +95,11 @@ def _undetermined(
 
 
 def _variances(weighted: Array, left: Array, fit: Fit, measurements: Measurements) -> Array | None:
-    """Return the variances (2,) of weighted residuals of position and orientation; None without freedom.
+    """Return the variances (2,) of weighted residuals (N, 6) by kind; None without freedom.
 
-    Args:
-        weighted: The residuals, shape (N, 6).
-        left: An orthonormal basis of what the parameters do to them, shape (6 N, r).
-        fit: Of the parameters.
-        measurements: To which it was fitted.
+    `left` (6 N, r) is an orthonormal basis of what the parameters do to them.
 
-    Source: Koch, Parameter Estimation and Hypothesis Testing in Linear Models (1999), section 3.6, for the
-    estimation of components of variance by iteration.
+    Source: Koch, Parameter Estimation and Hypothesis Testing in Linear Models (1999), section 3.6.
     """
     if measurements.deviations is not None:
         return np.ones(2)
@@ -112,20 +107,21 @@ def _variances(weighted: Array, left: Array, fit: Fit, measurements: Measurement
     grams, pulls = np.einsum("nkci,nkcj->kij", basis, basis), np.einsum("nkci,nkc->ki", basis, parts)
     squares = np.square(parts).sum(axis=(0, 2))
     counts = np.array(measurements.counts) * float(fit.weights.mean())
-    freedom = counts - np.trace(grams, axis1=1, axis2=2)
-    if freedom.sum() <= _FREEDOM:
+    freedoms = counts.sum() - left.shape[1]
+    if freedoms <= _FREEDOM:
         return None
-    pooled = squares.sum() / freedom.sum()
-    variances = np.where(freedom > _FREEDOM, squares / np.maximum(freedom, _FREEDOM), pooled)
+    variances = np.full(2, squares.sum() / freedoms)
     for _ in range(_ROUNDS):
-        if variances.min() <= 0.0 or freedom.min() <= _FREEDOM:
+        if variances.min() <= 0.0:
             break
         rows = grams / variances[:, None, None]
         inverse = np.linalg.inv(rows.sum(axis=0))
         change = inverse @ (pulls / variances[:, None]).sum(axis=0)
-        left_over = np.maximum(squares - 2.0 * pulls @ change + grams @ change @ change, 0.0)
+        missed = np.maximum(squares - 2.0 * pulls @ change + grams @ change @ change, 0.0)
         freedom = counts - np.einsum("kij,ji->k", rows, inverse)
-        variances = np.where(freedom > _FREEDOM, left_over / np.maximum(freedom, _FREEDOM), variances)
+        variances = np.where(freedom > _FREEDOM, missed / np.maximum(freedom, _FREEDOM), variances)
+        if freedom.min() <= _FREEDOM:
+            break
     return np.asarray(variances)
 
 
