@@ -133,3 +133,14 @@ def test_it_says_the_same_every_time():
     family = smooth(points(6, 12, 2))
     first, second = (fastest_durations(family, np.ones(11), bounds(1, 3, joints=2)) for _ in range(2))
     assert first.tobytes() == second.tobytes()
+
+
+def test_a_curve_may_end_before_the_durations_do():
+    """As under a law that overshoots: then points are reached before the time that it is given for them."""
+    q, limits = np.arange(4.0)[:, None], bounds(velocity=2.0)
+
+    def family(h):
+        return straight(q)(np.minimum(h, 1.0))
+
+    found = fastest_durations(family, np.array([50.0, 1.0, 1.0]), limits)
+    assert np.minimum(found, 1.0) == pytest.approx(0.5, rel=1e-3)

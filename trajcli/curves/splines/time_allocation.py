@@ -234,7 +234,8 @@ def _all_uses(family: CurveFamily, durations: Array, bounds: Array) -> Array:
     """Return log of what each piece uses of each limit, shape (m, r); what it does not use is -inf."""
     curve = family(durations)
     begins = np.concatenate([[0.0], np.cumsum(durations)[:-1]]) + 0.25 * durations.min()
-    first = np.maximum.accumulate(np.searchsorted(curve.breaks, begins, "right") - 1)
+    owner = np.minimum(np.searchsorted(curve.breaks, begins, "right") - 1, curve.pieces - 1)
+    first = np.maximum.accumulate(owner)
     first[0] = 0
     orders, parts = _orders(bounds), []
     extremes = piece_extremes(curve.coefficients, curve.lengths, orders)
