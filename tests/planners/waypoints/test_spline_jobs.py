@@ -253,6 +253,10 @@ def test_a_velocity_that_forbids_to_be_monotone():
         del point["time"]
     error = refusal(start, move, limits={"velocity": 1, "acceleration": 4})
     assert str(error).endswith("-0.5 rad/s of j2 at the last point keeps the curve from being monotone")
+    assert "`time`" not in str(error.problems[0].hint)  # against the way none helps
+    points[-1]["velocity"] = [0, 4]
+    slow = refusal(start, move, limits={"velocity": 10, "acceleration": 0.5})
+    assert "give every waypoint a `time`" in str(slow.problems[0].hint)
 
 
 def test_virtual_times_follow_a_stretch():

@@ -231,7 +231,8 @@ def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningEr
             "high": Amount(error.high, 1, joint, rounded="down"),
         }
     hint = "change that velocity, or use another rule than shape_preserving"
-    hint += "" if given else ", or give every waypoint a `time`"
+    helps = not given and error.velocity * (error.low + error.high) > 0.0  # against the way no time does
+    hint += ", or give every waypoint a `time`" if helps else ""
     return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
 
 
