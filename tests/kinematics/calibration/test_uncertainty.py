@@ -255,3 +255,13 @@ def test_without_freedom_nothing_is_known() -> None:
     found = uncertainty.uncertainty(fit_of(made, np.eye(4)[:, :3]), cast("Any", made), NAMES, Options(1.0))
     assert found.deviations == (None,) * 4
     assert (found.noise, found.correlations) == ((None, None), ())
+
+
+def test_noise_is_told_where_no_parameter_is() -> None:
+    """With nothing fitted it is the root mean square of the residuals, by kind."""
+    made = LinearMeasurements(20, 4)
+    fit = fit_of(made, np.zeros((4, 0)))
+    fit.weights[:] = 1.0
+    found = uncertainty.uncertainty(fit, cast("Any", made), NAMES, Options(1.0))
+    wanted = [float(np.sqrt(np.mean(made.residuals[:, part] ** 2))) for part in (slice(3), slice(3, 6))]
+    np.testing.assert_allclose(cast("Any", found.noise), wanted)

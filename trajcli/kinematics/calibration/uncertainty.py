@@ -103,7 +103,8 @@ def _variances(weighted: Array, left: Array, fit: Fit, measurements: Measurement
     """
     if measurements.deviations is not None:
         return np.ones(2)
-    basis, parts = left.reshape(-1, 2, 3, left.shape[1]), weighted.reshape(-1, 2, 3)
+    parts = weighted.reshape(-1, 2, 3)
+    basis = left.reshape(*parts.shape, left.shape[1])
     grams, pulls = np.einsum("nkci,nkcj->kij", basis, basis), np.einsum("nkci,nkc->ki", basis, parts)
     squares = np.square(parts).sum(axis=(0, 2))
     counts = np.array(measurements.counts) * float(fit.weights.mean())
