@@ -25,6 +25,7 @@ WORTH_MENTIONING = 0.9
 _MOST_CORRELATIONS = 10
 _FREEDOM = 0.5  # of one kind of residual, below which both kinds are taken together
 _ROUNDS = 20  # of weighing both kinds anew
+_EXACT, _TINY = 1e-8, 1e-200  # variance of what counts as exact: of that of the other kind; of no noise
 
 
 @comparable
@@ -74,7 +75,8 @@ def uncertainty(
     kinds = np.repeat(np.arange(2), 3)
     inverse = fit.span @ (right.T / values)
     spread = left * np.tile(np.sqrt(variances[kinds]), len(residuals))[:, None]
-    covariance = inverse @ (spread.T @ spread) @ inverse.T
+    root = inverse @ spread.T
+    covariance = root @ root.T
     free = _undetermined(fit, jacobian * weights[:, :, None], parameters, options)
     held = [parameter not in free for parameter in parameters]
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -113,11 +115,10 @@ def _variances(weighted: Array, left: Array, fit: Fit, measurements: Measurement
         return None
     variances = np.full(2, squares.sum() / freedoms)
     for _ in range(_ROUNDS):
-        if variances.min() <= 0.0:
-            break
-        rows = grams / variances[:, None, None]
+        against = np.maximum(variances, _EXACT * variances.max(initial=_TINY))
+        rows = grams / against[:, None, None]
         inverse = np.linalg.inv(rows.sum(axis=0))
-        change = inverse @ (pulls / variances[:, None]).sum(axis=0)
+        change = inverse @ (pulls / against[:, None]).sum(axis=0)
         missed = np.maximum(squares - 2.0 * pulls @ change + grams @ change @ change, 0.0)
         freedom = counts - np.einsum("kij,ji->k", rows, inverse)
         variances = np.where(freedom > _FREEDOM, missed / np.maximum(freedom, _FREEDOM), variances)
