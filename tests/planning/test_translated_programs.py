@@ -177,6 +177,9 @@ def test_a_palletiser_carries_its_boxes_from_the_infeed_to_the_slots() -> None:
     begun = [n for n, mass in enumerate(carrying) if mass and not carrying[n - 1]]
     ended = [n for n, mass in enumerate(carrying) if mass and not carrying[n + 1]]
     assert set(carrying) == {0.0, 12.0}
+    original, job = texts(next(title for title in TITLES if title.startswith("RAPID: a palletiser")))
+    assert "lBox := [12, [0, 0, 100]" in original  # the cog of a loaddata counts from the tcp, as com does
+    assert "mass: 12, com: [0, 0, 100]" in job
     ends = np.array([plan.trajectory.spans[n].end for n in ended])
     taken = np.array([plan.trajectory.spans[n].start for n in begun])
     np.testing.assert_allclose(tool_at(plan, taken)[:, :3, 3], [[1.2, -0.7, 0.8]] * 4, atol=1e-6)
@@ -201,6 +204,8 @@ def test_parts_are_gripped_at_the_tray_and_let_go_in_the_chuck() -> None:
     times, values = zip(*signal_times(plan), strict=True)
     assert values == (1, 0, 1, 0, 1, 0)
     places = tool_at(plan, np.array(times))
+    home = [-0.3922 - 0.0997, -0.1333, 0.1625 + 0.425 - 0.0996 - 0.14]  # in the maker's Base, by its DH table
+    np.testing.assert_allclose(tool_at(plan, np.zeros(1))[0, :3, 3], home, atol=1e-5)
     expected = np.array(loaded_parts()) / 1e3
     np.testing.assert_allclose(places[:, :3, 3], expected[[1, 4, 7, 10, 13, 16]], atol=2e-6)
     np.testing.assert_allclose(places[1::2, :3, 2], [[0, 1, 0]] * 3, atol=1e-5)
