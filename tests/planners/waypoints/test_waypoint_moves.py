@@ -212,6 +212,15 @@ def test_straight_keeps_to_the_polyline():
     assert "j1" in problem.text() or "j2" in problem.text()
 
 
+@pytest.mark.parametrize(
+    ("limits", "step", "length"), [((0.05, 1.0, 50.0), 2e-9, 30.0), ((0.01, 1.0, 1000.0), 1e-6, 5.0)]
+)
+def test_a_segment_far_shorter_than_the_others_takes_next_to_no_time(limits, step, length):
+    bounds = dict(zip(LIMITS, ([limit, limit] for limit in limits), strict=True))
+    case = {"waypoints": [[0.0, 0.0], [-step, step], [length, length]], "limits": bounds}
+    assert plan_of(case).trajectory.duration == pytest.approx(length / limits[0], rel=1e-3)
+
+
 def test_a_polyline_of_no_length_lets_nothing_move():
     still = {**CASE, "waypoints": [POINTS[0], POINTS[0]]}
     start = {"velocity": [0.0, 0.2, 0.0]}

@@ -40,6 +40,7 @@ _SPEEDS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)  # of central differences
 _PROVEN = 1e-7  # relative: a motion this near to the bound is the fastest
 _GRID, _COST = 2.0**-21, 1e-6  # relative: to what states are rounded, and how much longer that may last
 _ALIKE = 1e-3  # relative: durations this near to the shortest agree with it
+_TINY = 1e-6  # of the longest time: less is rounding
 _SHORT = 0.05  # of the longest time at the velocity limits: no segment begins with less
 
 _FAR = 100.0  # for a position limit that does not bind, in units of the joints
@@ -136,8 +137,9 @@ def _rounded(problem: WaypointProblem, motion: StateMotion) -> StateMotion:
 
 
 def _usual_times(problem: WaypointProblem, motion: StateMotion) -> Array:
-    """Return the times of a motion, or where it has none, twice those at the velocity limits."""
-    return np.where(np.isfinite(motion.times), motion.times, 2 * _speed_times(problem))
+    """Return the times of a motion, or where it has none, twice those at the velocity limits; none is zero."""
+    times = np.where(np.isfinite(motion.times), motion.times, 2 * _speed_times(problem))
+    return np.maximum(times, _TINY * times.max())
 
 
 def _speed_times(problem: WaypointProblem) -> Array:

@@ -183,7 +183,10 @@ class _Iterate:
         slack, force = self._slack, self._force
         matrix = slopes.stiffness(force.room / slack.room) + slopes.bending(-force.room, self._pull)
         landing = slopes.rows[:, :, -LANDINGS:]
-        system = KnotSystem(self._problem, matrix, landing, force.time / slack.time)
+        try:
+            system = KnotSystem(self._problem, matrix, landing, force.time / slack.time)
+        except np.linalg.LinAlgError:  # by rounding, as where a segment is far shorter than the others
+            return None
         for _ in range(_TRIES):
             if system.factor(self._curved):
                 return system
