@@ -221,6 +221,14 @@ def test_a_segment_far_shorter_than_the_others_takes_next_to_no_time(limits, ste
     assert plan_of(case).trajectory.duration == pytest.approx(length / limits[0], rel=1e-3)
 
 
+def test_late_short_ramps_of_a_straight_move_keep_the_acceleration():
+    """After an hour times are rounded to 5e-13 s, in which the jerk changes the acceleration by 5e-8."""
+    bounds = {"velocity": [0.01, 0.01], "acceleration": [1.0, 1.0], "jerk": [1e5, 1e5]}
+    corners = [[0.0, 0.0], [20.0, 10.0], [0.0, 1.0], [17.0, 10.0], [3.0, 0.0]]
+    plan = plan_of({"waypoints": corners, "limits": bounds}, straight=True)
+    assert plan.trajectory.duration == pytest.approx(100 * (20 + 20 + 17 + 14), rel=1e-4)
+
+
 def test_a_polyline_of_no_length_lets_nothing_move():
     still = {**CASE, "waypoints": [POINTS[0], POINTS[0]]}
     start = {"velocity": [0.0, 0.2, 0.0]}

@@ -137,9 +137,9 @@ def _rounded(problem: WaypointProblem, motion: StateMotion) -> StateMotion:
 
 
 def _usual_times(problem: WaypointProblem, motion: StateMotion) -> Array:
-    """Return the times of a motion, or where it has none, twice those at the velocity limits; none is zero."""
+    """Return the times of a motion, none of them zero, or twice those at the velocity limits."""
     times = np.where(np.isfinite(motion.times), motion.times, 2 * _speed_times(problem))
-    return np.maximum(times, _TINY * times.max())
+    return np.asarray(np.maximum(times, _TINY * times.max()))
 
 
 def _speed_times(problem: WaypointProblem) -> Array:

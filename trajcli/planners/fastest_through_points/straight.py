@@ -67,27 +67,27 @@ def straight_motion(problem: WaypointProblem, names: list[str], solve: Solve) ->
     Raises:
         PlanningError: When a velocity or acceleration that is given leaves the line.
     """
-    stretches = straight_stretches(problem.points)
-    parts = [_along(problem, first, last, names, solve) for first, last in stretches]
-    return joined([motion for motion, _ in parts]), math.fsum(lower for _, lower in parts)
+    laws = [_law(problem, *ends, names) for ends in straight_stretches(problem.points)]
+    lower = math.fsum(shortest_duration(law)[0] for law, _ in laws)
+    parts, first = [], 0
+    for law, line in laws:
+        parts.append(_along(problem.points[first], law, line, solve, lower))
+        first += law.segments
+    return joined(parts), lower
 
 
-def _along(
-    problem: WaypointProblem, first: int, last: int, names: list[str], solve: Solve
-) -> tuple[PointMotion, float]:
-    law, line = _law(problem, first, last, names)
+def _along(start: Array, law: WaypointProblem, line: Array, solve: Solve, total: float) -> PointMotion:
     given = law.least.any() or law.fixed[1:-1].any()
     if not given:  # the points between say nothing: the law goes past them
         direct = law.only([0, law.segments])
-        motion = exact_motion(direct, direct.states, ["the common law"])
+        motion = exact_motion(direct, direct.states, ["the common law"], total)
         times = times_at(motion.curve, law.points[1:-1, 0])
     else:
-        motion = exact_motion(law, solve(law), ["the common law"])
+        motion = exact_motion(law, solve(law), ["the common law"], total)
         times = motion.times[1:-1]
-    curve = along_line(problem.points[first], line, motion.curve)
+    curve = along_line(start, line, motion.curve)
     phases = tuple(Phase(p.name, p.start, p.end) for p in motion.phases)
-    whole = PointMotion(curve, np.concatenate([[0.0], times, [curve.duration]]), phases)
-    return whole, shortest_duration(law)[0]
+    return PointMotion(curve, np.concatenate([[0.0], times, [curve.duration]]), phases)
 
 
 def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> tuple[WaypointProblem, Array]:
