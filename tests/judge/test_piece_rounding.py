@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BPoly, CubicSpline
 
+from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.rounding import PieceRows, stated_errors
 
 Array = NDArray[np.float64]
@@ -102,6 +104,29 @@ def test_the_error_of_a_piece_bounds_what_all_sources_make_together(count: int, 
         assert true <= bound * (1 + 1e-9)
         shares.append(bound / true)
     assert min(shares) < 2.5
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("late", [0.0, 0.05, 0.1, 0.3])
+def test_what_two_rows_make_certain_is_the_least_that_rounding_leaves(late: float, sign: float) -> None:
+    """Stamps that may hide the whole length make the speed uncertain upwards alone."""
+    ends = (sign * np.array([[0.2], [0.5]]),)
+    rows = PieceRows(np.array([LENGTH]), np.array([late]), ends, (np.array([0.01]),))
+    off = np.linspace(-0.01, 0.01, 5)
+    lengths = np.linspace(max(LENGTH - late, 1e-9), LENGTH + late, 9)
+    least = min((0.3 + a - b) / length for a, b, length in product(off, off, lengths))
+    assert rows.certain_difference(0, sign)[0] == pytest.approx(least, rel=1e-12)
+    assert rows.certain_difference(0, -sign)[0] == -np.inf
+
+
+def test_a_speed_far_beyond_its_limit_is_certain_whatever_the_stamps_hide(tmp_path: Path) -> None:
+    """Stamps of two decimals, 10 and 20 ms apart: each may be off by half of that, 1 rad in 30 ms is 33 rad/s."""
+    rows, arm = tmp_path / "rows.csv", tmp_path / "arm.yaml"
+    stamps = ("0.00", "0.01", "0.03", "0.04", "0.05", "0.07")
+    rows.write_text("t,q1\n" + "".join(f"{t},{k}.000\n" for k, t in enumerate(stamps)))
+    for limit, verdict in ((33, "exceeded"), (60, "within rounding")):
+        arm.write_text(f"joints: [{{velocity: {limit}}}]\n")
+        assert check_file(str(rows), CheckOptions(robot=str(arm))).judgement.verdict == verdict
 
 
 @pytest.mark.parametrize(("order", "most"), [(0, 1.0), (1, 3.0), (2, 12.0), (3, 24.0)])

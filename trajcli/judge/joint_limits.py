@@ -239,9 +239,9 @@ def _stated(rows: PieceRows, order: int, sign: float) -> tuple[Array, Array]:
         stated = (sign * rows.ends[order]).max(axis=0)
         certain = stated - rows.errors[order]
     if 0 < order <= len(rows.ends):
-        slope, error = rows.difference(order - 1)
-        stated = np.where(sign * slope - error > certain, sign * slope, stated)
-        certain = np.maximum(certain, sign * slope - error)
+        least = rows.certain_difference(order - 1, sign)
+        stated = np.where(least > certain, sign * rows.difference(order - 1)[0], stated)
+        certain = np.maximum(certain, least)
     return stated, certain
 
 

@@ -64,6 +64,14 @@ class PieceRows:
             error = 2.0 * self.errors[order] / self.shortest + _less(change, self, 1)
             return change / self.length, np.where(np.isnan(error), np.inf, error)
 
+    def certain_difference(self, order: int, sign: float) -> Array:
+        """Return what the value of `difference` has at least in a direction; minus infinity where it may be none.
+
+        A length that rounding hides makes it uncertain how much larger the value is, but not how small.
+        """
+        change = sign * (self.ends[order][1] - self.ends[order][0]) - 2.0 * self.errors[order]
+        return np.where(change > 0.0, change / (self.length + self.late), -np.inf)
+
     def error(self, order: int) -> Array:
         """Return by how much a derivative of the pieces may be off anywhere on them, shape (m,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
