@@ -120,7 +120,7 @@ def test_what_two_rows_make_certain_is_the_least_that_rounding_leaves(late: floa
 
 
 def test_a_speed_far_beyond_its_limit_is_certain_whatever_the_stamps_hide(tmp_path: Path) -> None:
-    """Stamps of two decimals, 10 and 20 ms apart: each may be off by half of that, 1 rad in 30 ms is 33 rad/s."""
+    """Stamps of two decimals, 10 and 20 ms apart, may be off by 5 ms each: 1 rad in 30 ms is 33 rad/s."""
     rows, arm = tmp_path / "rows.csv", tmp_path / "arm.yaml"
     stamps = ("0.00", "0.01", "0.03", "0.04", "0.05", "0.07")
     rows.write_text("t,q1\n" + "".join(f"{t},{k}.000\n" for k, t in enumerate(stamps)))

@@ -65,7 +65,7 @@ class PieceRows:
             return change / self.length, np.where(np.isnan(error), np.inf, error)
 
     def certain_difference(self, order: int, sign: float) -> Array:
-        """Return what the value of `difference` has at least in a direction; minus infinity where it may be none.
+        """Return what the value of `difference` is at least in a direction; -inf where it may be none.
 
         A length that rounding hides makes it uncertain how much larger the value is, but not how small.
         """
