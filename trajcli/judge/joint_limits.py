@@ -239,8 +239,8 @@ def _stated(rows: PieceRows, order: int, sign: float) -> tuple[Array, Array]:
         stated = (sign * rows.ends[order]).max(axis=0)
         certain = stated - rows.errors[order]
     if 0 < order <= len(rows.ends):
-        least = rows.certain_difference(order - 1, sign)
-        stated = np.where(least > certain, sign * rows.difference(order - 1)[0], stated)
+        slope, least = rows.difference(order - 1)[0], rows.certain_difference(order - 1, sign)
+        stated = np.where(least > certain, sign * slope, stated)
         certain = np.maximum(certain, least)
     return stated, certain
 
