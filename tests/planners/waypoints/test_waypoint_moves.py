@@ -221,6 +221,18 @@ def test_a_segment_far_shorter_than_the_others_takes_next_to_no_time(limits, ste
     assert plan_of(case).trajectory.duration == pytest.approx(length / limits[0], rel=1e-3)
 
 
+def test_a_straight_move_with_time_to_spare_takes_no_run_up_beyond_its_corners():
+    """From three seconds before its first point it could pass that faster: it went 0.04 rad back to do so."""
+    line = [[0.0, 0.0], [0.1, 0.2], [0.3, 0.6], [1.0, 2.0]]
+    bounds = {"velocity": [1.0, 1.0], "acceleration": [3.0, 3.0], "jerk": [20.0, 20.0]}
+    case = {"waypoints": line, "limits": bounds}
+    curve = plan_of(case, straight=True, minimum_durations=[3, 0, 0]).trajectory.curve
+    positions = curve.evaluate(np.linspace(curve.start, curve.end, 4001))
+    assert positions.min() >= -1e-9
+    assert (positions.max(axis=0) <= np.array(line[-1]) + 1e-9).all()
+    assert curve.duration < 3 + 2.1
+
+
 def test_late_short_ramps_of_a_straight_move_keep_the_acceleration():
     """After an hour times are rounded to 5e-13 s, in which the jerk changes the acceleration by 5e-8."""
     bounds = {"velocity": [0.01, 0.01], "acceleration": [1.0, 1.0], "jerk": [1e5, 1e5]}

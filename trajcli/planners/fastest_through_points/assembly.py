@@ -17,7 +17,7 @@ from trajcli.planners.fastest_through_points.bound import shortest_duration
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.search import search
 from trajcli.planners.fastest_through_points.segment_motion import PointMotion, exact_motion
-from trajcli.planners.fastest_through_points.states import StateMotion
+from trajcli.planners.fastest_through_points.states import StateMotion, evaluated
 from trajcli.planners.fastest_through_points.straight import straight_motion, straight_stretches
 
 _NEARBY = (0.0, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0)  # by what part velocities are lowered in turn
@@ -147,7 +147,11 @@ def straight_only(problem: WaypointProblem, names: list[str], starts: int) -> Fa
     """
 
     def solve(law: WaypointProblem) -> Array:
-        return search(law, starts).best.states
+        best, polyline = search(law, starts).best, replace(law, position=np.array([[0.0, 1.0]]))
+        if not np.isfinite(evaluated(polyline, best.states).duration):  # a run-up from beyond its corners
+            within = search(polyline, starts).best
+            best = within if np.isfinite(within.duration) else best
+        return best.states
 
     motion, lower = straight_motion(problem, names, solve)
     return FastestMotion(motion, lower, None, (motion.duration,), 1, search(problem, 0).stopping)
