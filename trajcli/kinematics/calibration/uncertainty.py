@@ -25,7 +25,7 @@ WORTH_MENTIONING = 0.9
 _MOST_CORRELATIONS = 10
 _FREEDOM = 0.5  # of one kind of residual, below which both kinds are taken together
 _ROUNDS = 20  # of weighing both kinds anew
-_EXACT, _TINY = 1e-8, 1e-200  # variance of what counts as exact: of that of the other kind; of no noise
+_EXACT = 1e-10  # of the other kind's variance: one that falls so low tells nothing, and the first one counts
 
 
 @comparable
@@ -113,15 +113,17 @@ def _variances(weighted: Array, left: Array, fit: Fit, measurements: Measurement
     freedoms = counts.sum() - left.shape[1]
     if freedoms <= _FREEDOM:
         return None
-    variances = np.full(2, squares.sum() / freedoms)
-    for _ in range(_ROUNDS):
-        against = np.maximum(variances, _EXACT * variances.max(initial=_TINY))
-        rows = grams / against[:, None, None]
+    variances = first = np.full(2, squares.sum() / freedoms)
+    for step in range(_ROUNDS):
+        if variances.min() <= _EXACT * variances.max():
+            return first
+        rows = grams / variances[:, None, None]
         inverse = np.linalg.inv(rows.sum(axis=0))
-        change = inverse @ (pulls / against[:, None]).sum(axis=0)
+        change = inverse @ (pulls / variances[:, None]).sum(axis=0)
         missed = np.maximum(squares - 2.0 * pulls @ change + grams @ change @ change, 0.0)
         freedom = counts - np.einsum("kij,ji->k", rows, inverse)
         variances = np.where(freedom > _FREEDOM, missed / np.maximum(freedom, _FREEDOM), variances)
+        first = first if step else variances
         if freedom.min() <= _FREEDOM:
             break
     return np.asarray(variances)
