@@ -33,6 +33,10 @@ def plan() -> Plan:
 
 @pytest.fixture
 def source(plan: Plan, tmp_path: Path) -> EditedMotion:
+    return source_of(plan, tmp_path)
+
+
+def source_of(plan: Plan, tmp_path: Path) -> EditedMotion:
     write_plan(plan, str(tmp_path / "plan.csv"))
     return read_motion(str(tmp_path / "plan.csv"), ReadingOptions(), declared=Units())
 
@@ -65,6 +69,20 @@ def test_the_way_back_is_said_to_be_it(plan: Plan, source: EditedMotion, tmp_pat
     assert wrong.rows.qd is not None
     wrong.rows.qd[:] *= -1
     assert "backward" not in said(plan, wrong, tmp_path)[1]
+
+
+def test_the_way_back_is_said_to_be_it_where_its_stamps_are_a_grid_too(tmp_path: Path) -> None:
+    """The border of both moves is a row; the end is one, too."""
+    made = plan_job(
+        job_from_text(
+            "version: 1\nrobot: {joints: 1}\nstart: {joints: [0]}\n"
+            "moves: [{planner: quintic, to: {joints: [1]}, duration: 1},"
+            " {planner: quintic, to: {joints: [-1]}, duration: 2}]\n"
+            "output: {rate: 50, columns: [t, q, qd, move]}\n"
+        )
+    )
+    known, why = said(made, reverse(source_of(made, tmp_path)), tmp_path)
+    assert (known, "backward" in why) == (False, True)
 
 
 def test_a_longer_motion_is_said_to_be_longer(plan: Plan, source: EditedMotion, tmp_path: Path) -> None:

@@ -131,8 +131,9 @@ def compare_with_plan(
         if first is None:
             return RowComparison(planned=True)
         difference = difference or first
+    backward = _backward(of_file, plan, halves * factors, stamps)
     return RowComparison(
-        planned=False, difference=difference or _beside(of_file, plan, halves * factors, stamps)
+        planned=False, difference=backward or difference or _beside(of_file, plan, halves * factors, stamps)
     )
 
 
@@ -263,13 +264,13 @@ def _first_difference(rows: _Rows, plan: Plan, grid: Grid, halves: Array, stamps
 
 
 def _beside(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str:
-    """Return what rows are whose stamps are none of the motion: a part of it, that backward, or others."""
+    """Return what rows are whose stamps are none of the motion: a part of it, or others."""
     duration = plan.trajectory.duration
     if rows.kept is None or stamps.count < 2 or np.diff(rows.kept[:, rows.time]).min() <= 2 * _NANOSECOND:
         return _NO_GRID
     first, last = stamps.first - plan.loaded.job.output.start_time, stamps.last[1] - stamps.first
     if abs(last - duration) <= 2 * _NANOSECOND:
-        return _backward(rows, plan, halves, stamps) or _NO_GRID
+        return _NO_GRID
     after = first + last - duration
     if after > 2 * _NANOSECOND:
         return f"they last {last:.9g} s, and the motion {duration:.9g} s"
@@ -281,15 +282,23 @@ def _beside(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str:
 
 def _backward(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str | None:
     """Return that rows are those of the motion from its end to its start; None where they are others."""
-    assert rows.kept is not None  # noqa: S101
+    duration = plan.trajectory.duration
+    if rows.kept is None or abs(stamps.last[1] - stamps.first - duration) > 2 * _NANOSECOND:
+        return None
+    if np.diff(rows.kept[:, rows.time]).min(initial=np.inf) <= 2 * _NANOSECOND:
+        return None
     signs = np.array([-1.0 if (column.kind in _ODD) else 1.0 for column in rows.columns])
     turned = rows.kept[::-1] * signs
     turned[:, rows.time] = stamps.last[1] - rows.kept[::-1, rows.time]
-    duration = plan.trajectory.duration
+    moves = [k for k, column in enumerate(rows.columns) if column.kind == "move"]
+    edited = (
+        turned.copy()
+    )  # as `reverse` writes it: a row is of the move that follows, on the way back as well
+    edited[:, moves] = np.concatenate([rows.kept[-2::-1, moves], rows.kept[:1, moves]])
     grid = ListedGrid(duration, np.clip(turned[:, rows.time], 0.0, duration))
-    back = replace(rows, kept=turned)
-    if _first_difference(back, plan, grid, halves, stamps) is None:
-        return "they are it backward, from its end to its start"
+    for back in (turned, edited) if moves else (turned,):
+        if _first_difference(replace(rows, kept=back), plan, grid, halves, stamps) is None:
+            return "they are it backward, from its end to its start"
     return None
 
 
