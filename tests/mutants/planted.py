@@ -2,12 +2,14 @@
 
 Cosmic Ray changes one number or sign; these leave out a term, look at the first of two ends only, at one direction, at one
 block, or make a warning of an error. Each was killed when it was written down in planted.toml; one that survives is a test
-that was lost. Each process works in a copy of the tree of its own.
+that was lost. Each process works in a copy of the tree of its own. Which test kills a mutant is kept in killers.json: it is
+run first, and alone, the next time.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import random
 import subprocess
@@ -15,57 +17,99 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from fnmatch import fnmatch
 from itertools import groupby
 from pathlib import Path
 from queue import SimpleQueue
+from threading import Lock
+
+import pytest
 
 from tests.mutants.copies import copy_of_the_tree
-from tests.mutants.tables import Planted, read_planted, subjects
+from tests.mutants.tables import Planted, read_killers, read_planted, subjects, write_killers
+
+CACHE = ".pytest_of_mutants"
+ONE_AT_A_TIME = Lock()
 
 
-def passes(folder: Path, tests: Sequence[str]) -> bool:
-    """Return whether tests pass in a copy of the tree; those that take ten minutes do not."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]
-    variables = {"PYTHONPATH": str(folder), "OPENBLAS_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-    try:
-        return not subprocess.run(
-            command, check=False, capture_output=True, timeout=600, cwd=folder, env=os.environ | variables
-        ).returncode
-    except subprocess.TimeoutExpired:
-        return False
+@dataclass(frozen=True)
+class Bench:
+    """A copy of the tree in which mutants are tried, one after the other."""
 
+    folder: Path
 
-def outcome_of(mutant: Planted, tests: Sequence[str], folder: Path) -> str | None:
-    """Return what is wrong with a mutant that is tried in a copy of the tree; None where it is killed."""
-    path = folder / mutant.file
-    whole = path.read_text(encoding="utf-8")
-    if mutant.text not in whole:
-        return "is not in the file any more"
-    path.write_text(whole.replace(mutant.text, mutant.change, 1), encoding="utf-8")
-    try:
-        return "survives" if passes(folder, tests) else None
-    finally:
-        path.write_text(whole, encoding="utf-8")
+    def failing(self, tests: Sequence[str], *, compiled: bool = False) -> str | None:
+        """Return the first test that fails, or what stands for it where none has begun; None where all pass.
 
-
-def tried(file: str, mutants: Sequence[Planted], folders: SimpleQueue[Path]) -> list[str]:
-    """Return what is wrong with the mutants of one file, each in words, after its tests have passed without one."""
-    tests, folder = subjects()[file], folders.get()
-    try:
-        if not passes(folder, tests):
-            print(f"{file}: its tests fail without a mutant: {len(mutants)} not tried", flush=True)
-            return [file] * len(mutants)
-        outcomes = [(mutant, outcome_of(mutant, tests, folder)) for mutant in mutants]
-        wrong = [
-            f"{file}: {outcome}\n    - {mutant.text}\n    + {mutant.change}"
-            for mutant, outcome in outcomes
-            if outcome is not None
+        Tests that take ten minutes fail. With `compiled` the tests are kept as pytest has compiled them, for the next time.
+        """
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-x",
+            "-q",
+            "--tb=no",
+            "-p",
+            "no:xdist",
+            "-o",
+            f"cache_dir={CACHE}",
         ]
-        print("\n".join([*wrong, f"{file}: {len(wrong)} of {len(mutants)} not killed"]), flush=True)
-        return wrong
+        variables = {"PYTHONPATH": str(self.folder), "OPENBLAS_NUM_THREADS": "1"}
+        variables["PYTHONDONTWRITEBYTECODE"] = "" if compiled else "1"
+        found = self.folder / CACHE / "v/cache/lastfailed"
+        found.unlink(missing_ok=True)
+        try:
+            code = subprocess.run(
+                [*command, *tests],
+                check=False,
+                capture_output=True,
+                timeout=600,
+                cwd=self.folder,
+                env=os.environ | variables,
+            ).returncode
+        except subprocess.TimeoutExpired:
+            return tests[0]
+        if code == pytest.ExitCode.OK:
+            return None
+        return (
+            next(iter(json.loads(found.read_text(encoding="utf-8"))), tests[0])
+            if found.exists()
+            else tests[0]
+        )
+
+    def killer(self, mutant: Planted, tests: Sequence[str], former: str | None) -> str | None:
+        """Return the test that kills a mutant, that which killed it before if it does; None if none of its tests does."""
+        path = self.folder / mutant.file
+        whole = path.read_text(encoding="utf-8")
+        path.write_text(whole.replace(mutant.text, mutant.change, 1), encoding="utf-8")
+        try:
+            if former is not None and (self.folder / former.partition("::")[0]).exists():
+                again = self.failing([former])
+                if again == former:
+                    return former
+            return self.failing(tests)
+        finally:
+            path.write_text(whole, encoding="utf-8")
+
+
+def tried(file: str, mutants: Sequence[Planted], benches: SimpleQueue[Bench]) -> list[Planted]:
+    """Return the mutants of one file that live, each said in words, after its tests have passed without one."""
+    tests, former, bench = subjects()[file], read_killers(), benches.get()
+    try:
+        if (failed := bench.failing(tests, compiled=True)) is not None:
+            print(f"{file}: {failed} fails without a mutant: {len(mutants)} not tried", flush=True)
+            return list(mutants)
+        killers = {mutant: bench.killer(mutant, tests, former.get(mutant)) for mutant in mutants}
     finally:
-        folders.put(folder)
+        benches.put(bench)
+    with ONE_AT_A_TIME:
+        write_killers(killers)
+    alive = [mutant for mutant, killer in killers.items() if killer is None]
+    lines = [f"{file}: survives\n    - {mutant.text}\n    + {mutant.change}" for mutant in alive]
+    print("\n".join([*lines, f"{file}: {len(alive)} of {len(mutants)} not killed"]), flush=True)
+    return alive
 
 
 def main() -> None:
@@ -85,12 +129,12 @@ def main() -> None:
         places = sorted(random.Random(asked.seed).sample(range(len(chosen)), min(asked.sample, len(chosen))))
         chosen = [chosen[place] for place in places]
     by_file = [(file, list(group)) for file, group in groupby(chosen, key=lambda mutant: mutant.file)]
-    folders: SimpleQueue[Path] = SimpleQueue()
+    benches: SimpleQueue[Bench] = SimpleQueue()
     with tempfile.TemporaryDirectory() as place, ThreadPoolExecutor(asked.jobs) as pool:
         for number in range(asked.jobs):
             copy_of_the_tree(Path(place) / str(number))
-            folders.put(Path(place) / str(number))
-        wrong = sum(len(one) for one in pool.map(lambda pair: tried(*pair, folders), by_file))
+            benches.put(Bench(Path(place) / str(number)))
+        wrong = sum(len(one) for one in pool.map(lambda pair: tried(*pair, benches), by_file))
     print(f"{wrong} of {len(chosen)} were not killed")
     sys.exit(1 if wrong else 0)
 

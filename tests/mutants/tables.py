@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 import tomllib
 from collections.abc import Mapping
@@ -10,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
+KILLERS = HERE / "killers.json"
 KINDS = ("equivalent", "convention", "small")
 
 
@@ -57,6 +60,27 @@ def read_survivors() -> list[Survivor]:
 def read_planted() -> list[Planted]:
     """Return the mutants that somebody wrote, file by file."""
     return [Planted(path, *pair) for path, pairs in _read("planted.toml").items() for pair in pairs]
+
+
+def _mark(mutant: Planted) -> str:
+    return hashlib.sha256("\0".join([mutant.file, mutant.text, mutant.change]).encode()).hexdigest()[:12]
+
+
+def read_killers() -> dict[Planted, str]:
+    """Return the test that last killed each planted mutant, where that is written down."""
+    marks = json.loads(KILLERS.read_text(encoding="utf-8"))
+    tests = {mark: test for test, killed in marks.items() for mark in killed}
+    return {mutant: tests[_mark(mutant)] for mutant in read_planted() if _mark(mutant) in tests}
+
+
+def write_killers(killers: Mapping[Planted, str | None]) -> None:
+    """Write down which test killed each of these mutants, None for none; of mutants that are planted no more nothing is kept."""
+    by_test: dict[str, list[str]] = {}
+    for mutant, test in (read_killers() | killers).items():
+        if test is not None:
+            by_test.setdefault(test, []).append(_mark(mutant))
+    lines = [f"  {json.dumps(test)}: {json.dumps(sorted(marks))}" for test, marks in sorted(by_test.items())]
+    KILLERS.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 
 def read_scores() -> dict[str, dict[str, int]]:
