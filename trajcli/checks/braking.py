@@ -51,7 +51,6 @@ def braking_intervals(
         on_line: Whether all joints brake together, on one straight line, instead of each by itself.
     """
     bounds = np.stack([limits.of_order(order) for order in (1, 2, 3)], axis=1)
-    bounds[:, 2] = np.abs(bounds[:, 2]).min(axis=1)[:, None] * [-1.0, 1.0]
     rates = list(zip(velocity.tolist(), acceleration.tolist(), strict=True))
     law, direction = None, np.ones(velocity.size)
     if on_line:
