@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from joined_by_scipy import largest_share
+from scipy.interpolate import BPoly
 from tiers import few
 
 import trajcli
-from trajcli.grids import UniformGrid
+from trajcli.grids import ListedGrid, UniformGrid
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.output.delivery import joined_rows as module
@@ -81,9 +82,21 @@ def test_of_very_many_rows_only_those_about_breaks_are_looked_at(monkeypatch: py
     judged = rows.judgement()
     assert judged is not None
     assert {found.kind for found in judged.findings} == {"velocity"}
-    assert max(found.excess for found in judged.findings) == pytest.approx(
-        1.512
-    )  # of the quintic, as at 1 deg/s
+    # of the quintic at the start, as at 1 deg/s; at the end the ramp lasts as long as the stamps' last bit, and its
+    # acceleration is stated
+    grid = rows.grid
+    assert isinstance(grid, UniformGrid)
+    for low, first in ((0, 0), (grid.count - 2, 1)):
+        local = grid.local(low, low + 2)
+        states = np.concatenate(
+            [*sample(plan.trajectory, ListedGrid(grid.duration, local), ("q", "qd", "qdd"))]
+        ).reshape(2, 3, 2)
+        joined = BPoly.from_derivatives(local - local[0], states).derivative()
+        speeds = np.abs(joined(np.linspace(0, local[1] - local[0], 1001))).max(axis=0) / np.radians(1e-7)
+        of_interval = (
+            [found.excess for found in judged.findings if (found.row or 0) > 1] if first else [1.512]
+        )
+        assert max(of_interval) == pytest.approx(speeds.max(), rel=1e-4)
     assert rows.rounding() > 0
     monkeypatch.setattr(module, "_ROWS", 16)
     for other in (planned("ur5e_pick", "output.rate=333"), planned("septic")):
@@ -176,3 +189,30 @@ def test_between_rows_of_two_moves_the_tool_has_left_its_path(tmp_path: Path) ->
     found = joined_rows(strict, grid_of(plan), FORMATS["csv"]).judgement()
     assert found is not None
     assert ("deviation", 0) in {(f.kind, f.move) for f in found.findings}
+
+
+LATER = LIFT.replace("start: {joints: [0, -90,", "start: {joints: [30, -90,").replace(
+    "moves:\n", "moves:\n  - {planner: jerk_limited, to: {joints: [0, -90, 90, -90, -90, 20]}}\n", 1
+)
+
+
+def test_a_line_behind_another_move_is_followed_from_its_own_start_on(tmp_path: Path) -> None:
+    """Nothing leaves it, though it begins after a second."""
+    from trajcli.judge.file import CheckOptions, check_file
+
+    plan, file = plan_job(job_from_text(LATER)), tmp_path / "rows.csv"
+    trajcli.plan(LATER).save(file)
+    own = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement()
+    read = check_file(str(file), CheckOptions(), plan).judgement
+    assert own is not None
+    excess = [{(f.kind, f.joint, f.move): f.excess for f in found.findings} for found in (own, read)]
+    assert excess[0] == pytest.approx(excess[1], rel=1e-4)
+    assert {move for kind, _, move in excess[1] if kind == "jerk"} >= {1, 2}
+    assert "deviation" not in {kind for kind, _, _ in excess[1]}
+    line = replace(
+        plan.moves[1].planned, tool=replace(plan.moves[1].planned.tool, tolerance=Tolerance(1e-9, 1e-9))
+    )
+    strict = replace(plan, moves=(plan.moves[0], replace(plan.moves[1], planned=line), *plan.moves[2:]))
+    found = joined_rows(strict, grid_of(plan), FORMATS["csv"]).judgement()
+    assert found is not None
+    assert ("deviation", 1) in {(f.kind, f.move) for f in found.findings}

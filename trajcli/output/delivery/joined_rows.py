@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from trajcli.columns import Group, joint_factors
 from trajcli.curves.extrema import piece_extremes
-from trajcli.curves.piecewise import Array, PiecewisePolynomial
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coefficients, horner
 from trajcli.findings import Collector, Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.grids import AT_BREAK, NANOSECOND, Grid, KnotGrid, ListedGrid, UniformGrid
@@ -40,7 +40,8 @@ _PIECES = 8192  # whose ends are looked at together
 _JUDGED = 1024  # intervals that are judged together
 _DEGREES = {"linear": 1, "cubic": 3, "quintic": 5}
 _SPACING = 4.0  # units in the last place of a length
-_CONTINUOUS = 1e-9  # of the largest value of a joint: a step below that is rounding
+_CONTINUOUS = 1e-9  # of the smaller size of a derivative in two pieces: a step below that is none
+_ROUNDING = 1e-13  # of the larger one
 _PERIOD = 1e-9  # relative: what the last row may be off its grid by
 _HALF_UNIT = 0.5e-9  # of nine decimals
 _NEGLIGIBLE = 2e-7  # relative: what is above a limit between rows by less needs no look
@@ -121,7 +122,7 @@ class JoinedRows:
         return as_planned(replace(begun, findings=tuple(map(self._in_time, findings))), slack)
 
     def _runs(self, window: JoinedPairs, worst: _Collectors) -> Iterator[JudgedRun]:
-        """Yield the pieces of moves, where the worst will do of neighbours with equal limits at once."""
+        """Yield the pieces of moves, of neighbours with equal limits at once."""
         from trajcli.judge.joint_limits import JudgedRun
 
         required = self._requirements
@@ -131,8 +132,7 @@ class JoinedRows:
         ]
         first = 0
         for k, (robot, carries_one, _, high) in enumerate(runs):
-            last = k + 1 == len(runs) or not worst.together
-            if last or runs[k + 1][0] is not robot or runs[k + 1][1] != carries_one:
+            if k + 1 == len(runs) or runs[k + 1][0] is not robot:  # of one robot, whose payload is one
                 pieces = slice(runs[first][2], high)
                 yield JudgedRun(window, pieces, robot, worst.of(robot), True, carries_one)
                 first = k + 1
@@ -230,7 +230,7 @@ class JoinedRows:
         grid = self.grid
         if isinstance(grid, UniformGrid):
             last = grid.local(grid.count - 2, grid.count)
-            return float(last[1] - last[0] if grid.count == 2 else min(1.0 / grid.rate, last[1] - last[0]))
+            return float(last[1] - last[0])  # no other is shorter
         return float(np.diff(np.concatenate([local for _, local in grid.blocks(_ROWS)])).min())
 
     def _blocks(self, degree: int) -> Iterator[tuple[Array, int]]:
@@ -254,7 +254,7 @@ class JoinedRows:
         breaks, count = self.plan.trajectory.curve.breaks, grid.count
         other = np.flatnonzero(self._others(degree))
         begins, ends = np.append(breaks, breaks[other]), np.append(breaks, breaks[other + 1])
-        first = np.clip(np.floor(begins * grid.rate) - 2, 0, count - 1).astype(np.intp) // _ROWS
+        first = np.clip(np.floor(begins * grid.rate), 0, count - 1).astype(np.intp) // _ROWS
         last = np.clip(np.floor(ends * grid.rate) + 3, 0, count - 1).astype(np.intp) // _ROWS
         opened, closed = (np.bincount(each, minlength=(count - 1) // _ROWS + 1) for each in (first, last))
         yield from np.flatnonzero(np.cumsum(opened) - np.cumsum(closed) + closed).tolist()
@@ -277,8 +277,8 @@ class JoinedRows:
         for piece in np.flatnonzero(other[max(low - 1, 0) : high]) + max(low - 1, 0):
             ends = np.searchsorted(times, curve.breaks[piece : piece + 2])
             found[ends[0] : ends[1] + 1] = True
-        low, high = np.searchsorted(self._moved, (times[0] - near, times[-1] + near))
-        at = np.searchsorted(times, self._moved[low:high] - near)
+        low, high = np.searchsorted(self._moved, (times[0] - NANOSECOND, times[-1] + NANOSECOND))
+        at = np.searchsorted(times, self._moved[low:high] - NANOSECOND)
         found[at] = found[at + 1] = True
         return np.flatnonzero(found[1 : count + 1])
 
@@ -304,13 +304,17 @@ class JoinedRows:
 
     @cached_property
     def _moved(self) -> Array:
-        """Times of knots whose position is not that of the curve: behind steps of the acceleration."""
+        """Times at which rows may state what the curve does not, rising.
+
+        Knots behind steps of the acceleration state another position, rows near short pieces other rates.
+        """
         grid, curve = self.grid, self.plan.trajectory.curve
+        breaks = curve.breaks if (curve.lengths <= NANOSECOND).any() else curve.breaks[:0]
         if not isinstance(grid, KnotGrid):
-            return np.empty(0)
+            return breaks
         times = grid.local[grid.at]
         off = np.abs(grid.states[0] - curve.evaluate(np.minimum(times + curve.start, curve.end)))
-        return np.asarray(times[(off > _MOVED).any(axis=1)])
+        return np.sort(np.append(times[(off > _MOVED).any(axis=1)], breaks))
 
     def _steps(self, degree: int) -> NDArray[np.bool_]:
         """Return at which breaks a derivative steps that the rows state, shape (pieces + 1,)."""
@@ -320,11 +324,8 @@ class JoinedRows:
     def _steps_of_order(self) -> tuple[NDArray[np.bool_], ...]:
         curve = self.plan.trajectory.curve
         steps = [np.zeros(curve.pieces + 1, dtype=bool)]
-        short = np.flatnonzero(curve.lengths <= NANOSECOND)  # what they do between two rows is a step there
         for order in (1, 2):
-            here = _stepping(curve, order)
-            here[short] = here[short + 1] = True
-            steps.append(steps[-1] | here)
+            steps.append(steps[-1] | _stepping(curve, order))
         return tuple(steps)
 
     def _pairs(self, kept: list[tuple[Array, NDArray[np.int64]]], chosen: Interpolation) -> JoinedPairs:
@@ -397,15 +398,18 @@ class _Collectors:
 
 
 def _stepping(curve: PiecewisePolynomial, order: int) -> NDArray[np.bool_]:
-    """Return at which breaks a derivative steps by more than rounding, shape (pieces + 1,)."""
-    blocks = [slice(k, k + _PIECES + 1) for k in range(0, curve.pieces, _PIECES)]
-    room = _CONTINUOUS * np.max(
-        [np.abs(ends).max(axis=0) for block in blocks for ends in curve.piece_ends(order, block)], axis=0
-    )
+    """Return at which breaks a derivative steps by more than rounding, shape (pieces + 1,).
+
+    Rounding is measured by the pieces on both sides: others may be short, and immense.
+    """
     steps = np.zeros(curve.pieces + 1, dtype=bool)
-    for block in blocks:
+    for low in range(0, curve.pieces, _PIECES):
+        block = slice(low, low + _PIECES + 1)
         first, last = curve.piece_ends(order, block)
-        steps[block.start + 1 : block.start + len(first)] = (np.abs(first[1:] - last[:-1]) > room).any(axis=1)
+        terms = np.abs(derivative_coefficients(curve.coefficients[:, block], order))
+        sizes = horner(terms, curve.lengths[block, None])
+        near = _CONTINUOUS * np.minimum(sizes[1:], sizes[:-1]) + _ROUNDING * np.maximum(sizes[1:], sizes[:-1])
+        steps[low + 1 : low + len(first)] = (np.abs(first[1:] - last[:-1]) > near).any(axis=1)
     return steps
 
 
