@@ -217,3 +217,56 @@ def test_files_with_nothing_in_common_are_refused():
     with pytest.raises(InputError, match=r"a\.csv and b\.csv have no column in common") as caught:
         exactly(table({"t": [0.0]}), table({"x": [0.0]}, "b.csv"))
     assert caught.value.problems[0].hint == "the first has t; the second has x"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("pair", [(1.0, 1.1), (1.1, 1.0), (-0.05, 0.05), (0.0, 0.1)])
+def test_the_larger_magnitude_of_both_counts_in_a_relative_tolerance(pair, sign):
+    a, b = table({"q1": [sign * pair[0]]}), table({"q1": [sign * pair[1]]}, "b.csv")
+    share = 0.1 / max(map(abs, pair))
+    assert compare(a, b, {}, {"q": share * (1 + 1e-9)}).equal
+    assert not compare(a, b, {}, {"q": share * (1 - 1e-9)}).equal
+    allowed = compare(a, b, {"q": 0.025}, {"q": share * 0.75}).worst.tolerance
+    assert allowed == pytest.approx(0.1)
+
+
+def test_without_a_tolerance_the_smallest_difference_is_worse_than_any_that_is_accepted():
+    a = table({"q1": [0.0], "qd1": [0.0]})
+    found = compare(a, table({"q1": [0.5], "qd1": [1e-9]}, "b.csv"), {"q": 1.0}, {})
+    assert (found.worst.column, found.first.column) == ("qd1", "qd1")
+
+
+def test_a_column_has_one_partner_at_most():
+    found = exactly(table({"q1": [1.0], "q1_deg": [5.0]}), table({"q1": [1.0]}, "b.csv"))
+    assert found.missing == (("q1_deg", 1),)
+    assert found.columns[0].count == 0
+
+
+def test_an_angle_is_no_length_in_any_column():
+    with pytest.raises(InputError, match=r"q2_mm in a.csv and q2_deg in b.csv are a length and an angle"):
+        exactly(table({"q1": [1.0], "q2_mm": [1.0]}), table({"q1": [1.0], "q2_deg": [1.0]}, "b.csv"))
+
+
+@pytest.mark.parametrize("one_first", [True, False])
+def test_one_row_is_near_that_of_a_grid_by_the_period_of_the_grid(one_first):
+    for off, near in ((1e-9, True), (1e-6, False)):
+        one, many = table({"t": [off], "q1": [0.0]}, "one.csv"), motion()
+        pair = (one, many) if one_first else (many, one)
+        if near:
+            found = exactly(*pair)
+            assert (found.rows, found.ended) == (1, (int(not one_first), off))
+        else:
+            with pytest.raises(InputError, match="different times"):
+                exactly(*pair)
+
+
+def test_two_rows_at_different_times_are_not_compared():
+    with pytest.raises(InputError, match="different times"):
+        exactly(table({"t": [0.0], "q1": [0.0]}), table({"t": [0.1], "q1": [0.0]}, "b.csv"))
+
+
+@pytest.mark.parametrize("by", [1e-6, -1e-6])
+def test_a_ten_thousandth_of_a_period_is_another_time(by):
+    a = motion()
+    with pytest.raises(InputError, match="row 0 is at"):
+        exactly(a, Table(a.names, a.columns + np.array([by, 0, 0, 0]), a.decimals, "b.csv"))

@@ -100,3 +100,45 @@ def test_what_cannot_be_resampled_is_refused(a, b, words):
 def test_one_row_is_resampled_by_itself():
     found = exactly(motion(), motion(1, 1.0, "b.csv"), resample=True)
     assert (found.equal, found.rows) == (True, 1)
+
+
+CUBIC, SLOPE, BEND = np.array([2.0, -1.0, 0.5, 0.3]), np.array([6.0, -2.0, 0.5]), np.array([12.0, -2.0])
+PAIRS = [
+    ("q1", "qd1"), ("qd1", "qdd1"), ("qdd1", "qddd1"), ("s", "sd"), ("sd", "sdd"), ("x", "vx"), ("z", "vz"),
+    ("vy", "ay"), ("wx", "ex"), ("wz", "ez"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "rate"), PAIRS)
+def test_a_cubic_is_interpolated_exactly_with_its_derivative_and_not_without(name, rate):
+    fine, coarse = np.linspace(0, 1, 41), np.linspace(0, 1, 5)
+    a = table({"t": fine, name: np.polyval(CUBIC, fine)})
+    b = table({"t": coarse, name: np.polyval(CUBIC, coarse), rate: np.polyval(SLOPE, coarse)}, "b.csv")
+    assert worst_of(exactly(a, b, resample=True), name) < 1e-14
+    assert worst_of(exactly(a, without(b, rate), resample=True), name) > 1e-2
+
+
+@pytest.mark.parametrize("other", ["qd2", "qd1_deg", "qd1_mm", "qdd1", "vx"])
+def test_a_derivative_of_another_joint_or_in_another_unit_is_none(other):
+    fine, coarse = np.linspace(0, 1, 41), np.linspace(0, 1, 5)
+    a = table({"t": fine, "q1": np.polyval(CUBIC, fine)})
+    b = table({"t": coarse, "q1": np.polyval(CUBIC, coarse), other: 7 + coarse}, "b.csv")
+    assert exactly(a, b, resample=True).worst == exactly(a, without(b, other), resample=True).worst
+    assert "linear for q" in exactly(a, b, resample=True).notes[0]
+
+
+def test_rows_before_the_second_file_are_counted_but_not_compared():
+    a, b = motion(101, 0.01), motion(51, 0.01, "b.csv", start=0.3)
+    found = compare(a, changed(b, "q1", 7, 0.25), {"q": 1e-9, ALL: 1.0}, {}, resample=True)
+    for deviation in (found.first, found.worst):
+        assert (deviation.row, deviation.time) == (37, pytest.approx(0.37))
+        assert deviation.a == pytest.approx(np.sin(3 * 0.37))
+    assert (found.rows, found.columns[0].count) == (51, 1)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_times_of_either_file_must_increase_to_be_interpolated(first):
+    falling = table({"t": [0.0, 0.2, 0.1], "q1": [0, 0, 0]}, "a.csv" if first else "b.csv")
+    pair = (falling, motion(file="b.csv")) if first else (motion(), falling)
+    with pytest.raises(InputError, match=f"the times of {falling.file} do not increase"):
+        exactly(*pair, resample=True)

@@ -115,7 +115,7 @@ def align_rows(a: Table, b: Table, pairs: tuple[Pair, ...], slack: float = 0.0) 
         InputError: When the times are not those of one grid, or when there are none and the numbers of
             rows differ.
     """
-    count = min(len(a.columns), len(b.columns))
+    count = len(a.columns)
     longer = len(a.columns) != len(b.columns)
     clock = time_pair(pairs)
     ended = None

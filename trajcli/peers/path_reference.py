@@ -174,7 +174,10 @@ def breaches_of(curve: PiecewisePolynomial, limits: Limits, orders: Sequence[int
                 (extremes.high[joint], bounds[joint, 1], extremes.high_time[joint], 1.0),
             )
             beyond = [
-                (sign * (value - bound), LimitBreach(order, joint, float(value), float(bound), float(time)))
+                (
+                    sign * (value - bound),
+                    LimitBreach(order, joint, float(value), float(bound), float(time) - curve.start),
+                )
                 for value, bound, time, sign in sides
                 if exceeds(sign * value, sign * bound)
             ]
