@@ -104,6 +104,9 @@ def test_limits_that_the_peers_own_motions_break_are_those_of_their_joint(
         for order, limit in ((1, 1.0), (2, 2.0), (3, 8.0)):
             assert abs(breaches[order].value) == pytest.approx(2 * limit)
             assert abs(breaches[order].limit) == limit
+    monkeypatch.undo()
+    (alone,) = fastest_duration(state([0.1] + [0.0] * 2), state([1.0, 2.0 * side, -1.0]), given).breaches
+    assert (alone.order, alone.joint, alone.limit) == (0, 1, 1.5 * side)
 
 
 @pytest.mark.parametrize("at", ["start", "end"])
@@ -170,3 +173,12 @@ def test_an_end_beyond_its_limit_by_rounding_is_laid_onto_it(order: int, side: f
         if isinstance(found, NoBound):
             name = ("velocity", "acceleration")[order - 1]
             assert found.reason == f"it {at}s outside its {name} limit"
+
+
+@pytest.mark.parametrize("last", [0.4, 0.0, -0.6])
+def test_a_motion_that_ends_the_other_way_counts_its_end_by_that_direction(last: float) -> None:
+    """Up by 3 rad and down by 2."""
+    given = limits([[-1.0, 2.0]], [[-3.0, 4.0]])
+    found = duration_through(np.array([[0.0], [3.0], [1.0]]), state([0.0], 0.5), state([1.0], last), given)
+    expected = ramps(3.0, 2.0, 4.0, 3.0, 0.5, 0.0) + ramps(2.0, 1.0, 3.0, 4.0, 0.0, max(-last, 0.0))
+    assert found.duration == pytest.approx(expected, rel=1e-9)
