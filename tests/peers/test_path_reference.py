@@ -10,9 +10,11 @@ from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.read import job_from_text, load_job
-from trajcli.kinematics.robot import Limits
+from trajcli.kinematics.robot import Limits, unlimited
 from trajcli.output.report import report_of
-from trajcli.peers.path_reference import limit_use, path_reference
+from trajcli.peers.geometric_path import GeometricPath
+from trajcli.peers.move_reference import path_reference_of
+from trajcli.peers.path_reference import LimitBreach, limit_use, path_reference, reference_along
 from trajcli.planning.plan import plan_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -129,3 +131,111 @@ def test_the_command_prints_both(capfd):
     err = capfd.readouterr().err
     assert "x toppra along the same path (1.3" in err
     assert "most used of a limit: 100 % (acceleration of" in err
+
+
+def rates(velocity, acceleration):
+    both = np.array([-1.0, 1.0])
+    of_joints = [np.outer(np.broadcast_to(each, 2), both) for each in (velocity, acceleration)]
+    return Limits(unlimited(2).position, *of_joints, unlimited(2).jerk)
+
+
+def polyline(*points, scale=1.0, stops=(), deviation=0.0):
+    """A path of two joints whose s counts `scale` rad each."""
+    points = np.array(points, dtype=float)
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1) / scale
+    slopes = np.diff(points, axis=0) / lengths[:, None]
+    path = PiecewisePolynomial(np.append(0.0, np.cumsum(lengths)), np.stack([slopes, points[:-1]]))
+    return GeometricPath(path, np.array(stops, dtype=float), deviation)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0, 0.5])
+@pytest.mark.parametrize(
+    ("velocity", "acceleration", "first", "last", "expected"),
+    [
+        (1.0, np.inf, 1.0, 1.0, 3.0),
+        (np.inf, 2.0, 0.0, 0.0, 2 * np.sqrt(1.5)),
+        (1.0, 2.0, 0.0, 0.0, 3.5),
+        (1.0, 2.0, 1.0, 0.0, 3.25),
+        (1.0, 2.0, 0.0, 1.0, 3.25),
+        (1.0, 2.0, 1.0, 0.5, 3.0 + 0.25**2),
+        (1.0, 2.0, -1.0, 0.0, 3.5),
+    ],
+)
+def test_a_line_from_one_speed_to_another_is_the_trapezoid(
+    velocity, acceleration, first, last, expected, scale
+):
+    """Over 3 rad; a velocity against the path counts as none."""
+    along = polyline([0, 0], [3, 0], scale=scale, deviation=0.25)
+    velocities = np.array([first, 0.0]), np.array([last, 0.0])
+    found = reference_along(along, rates(velocity, acceleration), velocities)
+    assert found is not None
+    assert found.duration == pytest.approx(expected, rel=3e-3)
+    assert found.deviation == 0.25
+    resting = reference_along(along, rates(velocity, acceleration))
+    assert resting is not None
+    # without a limit of acceleration toppra's grid takes an interval to start, and one to stop
+    exact = 3.5 if velocity + acceleration < 9 else expected
+    assert resting.duration == pytest.approx(exact, rel=3e-3 if np.isfinite(acceleration) else 3e-2)
+
+
+def test_nothing_is_compared_where_nothing_is_limited():
+    assert reference_along(polyline([0, 0], [3, 0]), rates(np.inf, np.inf)) is None
+
+
+def test_between_the_ends_every_corner_is_a_stop():
+    """Three sides of 3, 2 and 3 rad from 1 rad/s to 1 rad/s: 3.25, 2.5 and 3.25 s; ends named as stops are none."""
+    along = polyline([0, 0], [3, 0], [3, 2], [0, 2], stops=[0.0, 3.0, 5.0, 8.0])
+    moving = np.array([1.0, 0.0]), np.array([-1.0, 0.0])
+    found = reference_along(along, rates(1.0, 2.0), moving)
+    assert found is not None
+    assert found.duration == pytest.approx(3.25 + 2.5 + 3.25, rel=3e-3)
+
+
+def test_a_range_that_the_path_leaves_is_broken():
+    limits = rates(1.0, 2.0)
+    limits = Limits(np.array([[-9.0, 9.0], [-9.0, 1.5]]), limits.velocity, limits.acceleration, limits.jerk)
+    found = reference_along(polyline([0, 0], [0, 2]), limits)
+    assert found is not None
+    (breach,) = [each for each in found.breaches if each.order == 0]
+    assert breach == LimitBreach(0, 1, pytest.approx(2.0), 1.5, pytest.approx(found.duration))
+
+
+def test_where_the_path_rests_toppra_begins_at_rest():
+    """A clamped spline has q' = 0 at both ends, and any sd is rest there."""
+    text = LINE.format(
+        points="[{joints: [1, 0.3]}, {joints: [2, -0.2]}, {joints: [3, 0.4]}]", path="rule: clamped"
+    )
+    move = plan_job(job_from_text(text)).moves[0]
+    found = path_reference(move)
+    assert found is not None
+    assert found.duration == pytest.approx(move.duration, rel=0.05)
+
+
+def test_a_spline_that_begins_and_ends_in_motion_is_compared_with_such_a_motion():
+    """At the limit of 1 rad/s all the way: 3 s; from rest to rest it would be 3.5 s."""
+    text = """
+version: 1
+robot: {joints: [{velocity: 1, acceleration: 2}]}
+start: {joints: [0], velocity: [1]}
+moves: [{planner: spline, rule: clamped, through: [{joints: [1.5], time: 1.5}], to: {joints: [3], time: 3, velocity: [1]}}]
+"""
+    (move,) = plan_job(job_from_text(text)).moves
+    found = path_reference_of(move)
+    assert found is not None
+    assert found.duration == pytest.approx(3.0, rel=1e-3)
+    assert found.deviation_unit == "rad"
+
+
+def test_a_tool_path_is_compared_and_joints_of_two_kinds_have_no_unit_of_deviation():
+    plan = plan_job(load_job(EXAMPLES / "line.yaml"))
+    assert any(path_reference_of(move) is not None for move in plan.moves)
+    mixed = """
+version: 1
+robot: {joints: [{velocity: 1, acceleration: 2}, {type: prismatic, velocity: 1, acceleration: 2}]}
+start: {joints: [0, 0]}
+moves: [{planner: spline, through: [{joints: [1, 0.2], time: 2}, {joints: [2, 0.1], time: 4}]}]
+"""
+    (move,) = plan_job(job_from_text(mixed)).moves
+    found = path_reference_of(move)
+    assert found is not None
+    assert found.deviation_unit == ""

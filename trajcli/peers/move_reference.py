@@ -121,7 +121,7 @@ def path_report(
 def _along_path(move: PlannedMove) -> PathReference | None:
     if move.planned.phase_plane is not None:
         return path_reference(move)
-    if (move.planned.via_points is None and move.planned.tool is None) or move.duration == 0:
+    if move.planned.via_points is None and move.planned.tool is None:
         return None
     from trajcli.peers.geometric_path import path_of_curve
 
