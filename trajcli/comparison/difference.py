@@ -205,7 +205,7 @@ def require_known(tolerances: Mapping[str, float], columns: Iterable[Column]) ->
         raise InputError(f"the tolerance for '{unknown[0]}' fits no column that both files have", hint=hint)
 
 
-def _flaw(entry: str, name: str, equals: str, number: str, known: Mapping[str, float]) -> str | None:
+def _flaw(entry: str, name: str, equals: str, number: str, taken: Mapping[str, float]) -> str | None:
     try:
         value = float(number)
     except ValueError:
@@ -214,7 +214,7 @@ def _flaw(entry: str, name: str, equals: str, number: str, known: Mapping[str, f
         return f"the tolerance '{entry}' is {value:g}, expected a finite number of at least 0"
     if equals and not name:
         return f"the tolerance '{entry}' names no column"
-    if (name or ALL) in known:
+    if (name or ALL) in taken:
         return f"the tolerance '{entry}' comes after another one for the same columns"
     return None
 
@@ -265,9 +265,9 @@ def _columns(difference: Difference) -> list[str]:
     if len(differing) < 2:
         return []
     lines = [f"  {_count(column.count, 'row')} of {_text(column.worst)}" for column in differing[:_SHOWN]]
-    rest = len(differing) - len(lines)
-    return [f"{len(differing)} columns differ, each with its worst:", *lines] + [f"  and {rest} more"] * (
-        rest > 0
+    more = len(differing) - len(lines)
+    return [f"{len(differing)} columns differ, each with its worst:", *lines] + [f"  and {more} more"] * (
+        more > 0
     )
 
 

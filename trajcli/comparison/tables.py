@@ -67,10 +67,10 @@ def pair_columns(a: Table, b: Table) -> tuple[tuple[Pair, ...], tuple[tuple[str,
     """
     left = {name: index for index, name in enumerate(b.names)}
     partners = {name: name for name in a.names if name in left}
-    rest = {_without_unit(name): name for name in left if name not in partners}
+    unpaired = {_without_unit(name): name for name in left if name not in partners}
     for name in a.names:
-        if name not in partners and _without_unit(name) in rest:
-            partners[name] = rest.pop(_without_unit(name))
+        if name not in partners and _without_unit(name) in unpaired:
+            partners[name] = unpaired.pop(_without_unit(name))
     pairs = tuple(
         Pair(parse_column(name), parse_column(partners[name]), index, left[partners[name]])
         for index, name in enumerate(a.names)
@@ -185,21 +185,22 @@ def interpolate_rows(a: Table, b: Table, pairs: tuple[Pair, ...]) -> Alignment:
         InputError: When not both tables have increasing times, when these share no interval, or when there is
             no other column.
     """
-    rest = tuple(pair for pair in pairs if pair.a.kind != "t")
-    if not rest:
+    others = tuple(pair for pair in pairs if pair.a.kind != "t")
+    if not others:
         raise InputError(f"{a.file} and {b.file} have no column in common but t", hint="leave --resample out")
     times_a, times_b = _times(a, b, pairs)
     rows = _rows_inside(a, b, times_a, times_b)
     gaps = _Gaps(times_b, times_a[rows])
-    values = np.empty((rows.stop - rows.start, len(rest)))
+    values = np.empty((rows.stop - rows.start, len(others)))
     methods: dict[str, list[str]] = {}
-    for index, pair in enumerate(rest):
+    for index, pair in enumerate(others):
         method, at_times = _interpolate(b, pair, gaps)
         values[:, index] = pair.in_units_of_a(at_times)
         methods.setdefault(method, []).append(pair.b.kind)
     how = "; ".join(f"{method} for {', '.join(dict.fromkeys(kinds))}" for method, kinds in methods.items())
     note = f"{b.file} is interpolated from {times_a[rows][0]:.12g} s to {times_a[rows][-1]:.12g} s ({how}); "
-    return Alignment(rest, rows, values, None, (note + f"{_interval(a, times_a)}, {_interval(b, times_b)}",))
+    note += f"{_interval(a, times_a)}, {_interval(b, times_b)}"
+    return Alignment(others, rows, values, None, (note,))
 
 
 def _times(a: Table, b: Table, pairs: tuple[Pair, ...]) -> tuple[Array, Array]:

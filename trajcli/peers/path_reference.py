@@ -109,8 +109,8 @@ def path_reference(move: PlannedMove) -> PathReference | None:
         return None
     # where the path itself is at rest, any sd is rest, and toppra may choose none
     ends = [
-        0.0 if rest else max(0.0, float(plane.law.evaluate(time, 1)[0]))
-        for rest, time in zip(is_at_rest(joints.path), (plane.law.start, plane.law.end), strict=True)
+        0.0 if still else max(0.0, float(plane.law.evaluate(time, 1)[0]))
+        for still, time in zip(is_at_rest(joints.path), (plane.law.start, plane.law.end), strict=True)
     ]
     return _along(joints, plane.stops, (ends[0], ends[1]), move.robot.limits)
 
@@ -195,8 +195,8 @@ def limit_use(curve: PiecewisePolynomial, limits: Limits) -> LimitUse | None:
         side, joint = np.unravel_index(int(parts.argmax()), parts.shape)
         time = (extremes.low_time, extremes.high_time)[side][joint]
         uses.append(LimitUse(name, int(joint), float(parts[side, joint]), float(time - curve.start)))
-    most = max(uses, key=lambda use: use.used)
-    return most if most.used > 0 else None
+    largest = max(uses, key=lambda use: use.used)
+    return largest if largest.used > 0 else None
 
 
 def _smooth_parts(path: PiecewisePolynomial, stops: Array) -> Iterator[tuple[float, float]]:

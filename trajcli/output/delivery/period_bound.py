@@ -56,9 +56,9 @@ def _joints_keep(move: PlannedMove, errors: Array, slack: float, judged: int) ->
     limits = move.robot.limits
     if limits.has_effort or limits.has_velocity_by_position:
         return np.zeros(errors.shape[1], dtype=bool)
-    room = np.stack([slack * np.abs(limits.of_order(k)).min(axis=1) for k in range(1, judged + 1)])
+    allowed = np.stack([slack * np.abs(limits.of_order(k)).min(axis=1) for k in range(1, judged + 1)])
     ranges = np.where(np.isfinite(limits.of_order(0)).any(axis=1), slack, np.inf)
-    kept = np.all(errors[1 : judged + 1] <= room[:, None], axis=(0, 2))
+    kept = np.all(errors[1 : judged + 1] <= allowed[:, None], axis=(0, 2))
     return np.asarray(kept & np.all(errors[0] <= ranges, axis=1))
 
 
