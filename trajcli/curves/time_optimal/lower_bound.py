@@ -98,14 +98,14 @@ def _shortest(joints: JointConstraint, grid: Array, x: Array) -> Array:
         np.abs(np.where(up == rising, joints.acceleration[:, 1], joints.acceleration[:, 0]))
         for rising in (True, False)
     )
-    most = np.where(up, joints.velocity[:, 1], -joints.velocity[:, 0])
+    fastest = np.where(up, joints.velocity[:, 1], -joints.velocity[:, 0])
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         begin = np.abs(path.evaluate(grid[:-1], 1)) * np.sqrt(x[:-1, None])
         end = np.abs(path.evaluate(grid[1:], 1, side="left")) * np.sqrt(x[1:, None])
         peak = np.sqrt((2.0 * gain * loss * D + loss * begin**2 + gain * end**2) / (gain + loss))
-        peak = np.minimum(np.maximum.reduce([peak, begin, end]), most)
+        peak = np.minimum(np.maximum.reduce([peak, begin, end]), fastest)
         begin, end = np.minimum(begin, peak), np.minimum(end, peak)
         cruise = D - (peak**2 - begin**2) / (2.0 * gain) - (peak**2 - end**2) / (2.0 * loss)
         times = (peak - begin) / gain + (peak - end) / loss + np.maximum(cruise, 0.0) / peak
-        least = np.where(np.isfinite(times) & (D > 0), times, np.where(D > 0, D / most, 0.0))
+        least = np.where(np.isfinite(times) & (D > 0), times, np.where(D > 0, D / fastest, 0.0))
     return np.asarray(least.max(axis=1))
