@@ -61,6 +61,13 @@ def test_slowest_joint_binds():
     assert fastest_duration(state([0.0] * 3), state([0.1, -4.0, 2.0]), given_limits) == LowerBound(5.0, 1)
 
 
+def test_joints_with_and_without_a_jerk_limit_bound_together():
+    mixed = limits([1.0, 1.0], [1.0, 1.0], [2.0, np.inf])
+    assert fastest_duration(state([0.0] * 2), state([0.3, -4.0]), mixed) == LowerBound(5.0, 1)
+    jerky = fastest_duration(state([0.0] * 2), state([4.0, 0.3]), mixed)
+    assert (jerky.duration, jerky.joint) == (pytest.approx(4 / 1 + 1 / 1 + 1 / 2, rel=1e-12), 0)
+
+
 def test_direction_of_the_limits_counts():
     given_limits = limits([[-0.5, 2.0]], [[-10.0, 10.0]])
     forth = fastest_duration(state([0.0]), state([4.0]), given_limits)

@@ -39,9 +39,9 @@ def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
     if any(curve.start - start > apart or end - curve.end > apart for curve in curves):
         raise ValueError(f"curves to merge must all cover [{start!r}, {end!r}]")
     if end == start:
-        return PiecewisePolynomial(curves[0].breaks, _stacked([curve.coefficients for curve in curves]))
+        return PiecewisePolynomial(curves[0].breaks, stacked([curve.coefficients for curve in curves]))
     columns = [(curve, k) for curve in curves for k in range(curve.dimension)]
-    values = _stacked([curve.coefficients[:, :, k, None] for curve, k in columns], axis=1)
+    values = stacked([curve.coefficients[:, :, k, None] for curve, k in columns], axis=1)
     return merge_pieces([curve.breaks for curve, _ in columns], values[:, :, 0])
 
 
@@ -85,7 +85,7 @@ def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.n
     return np.array(kept), index_of
 
 
-def _stacked(coefficients: Sequence[Array], axis: int = 2) -> Array:
+def stacked(coefficients: Sequence[Array], axis: int = 2) -> Array:
     """Return coefficients (degree + 1, pieces, n) beside each other, filled up to the highest degree."""
     rows = max(block.shape[0] for block in coefficients)
     filled = [

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from trajcli.curves.extrema import piece_extremes
+from trajcli.curves.operations import stacked
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError
 from trajcli.frozen import comparable
@@ -128,7 +129,7 @@ def _breaches(motions: Sequence[_Alone]) -> Iterator[LimitBreach]:
         return
     curves = [curve for _, curve, _ in motions]
     owner = np.repeat(np.arange(len(curves)), [curve.pieces for curve in curves])
-    polynomials = np.concatenate([curve.coefficients for curve in curves], axis=1)
+    polynomials = stacked([curve.coefficients for curve in curves], axis=1)
     lengths, passed = np.concatenate([curve.lengths for curve in curves]), np.zeros(owner.size, dtype=bool)
     for order, (low, high) in enumerate(piece_extremes(polynomials, lengths, _ORDERS)):
         bounds = np.concatenate([limits.of_order(order) for *_, limits in motions])[owner]
