@@ -73,11 +73,6 @@ class WaypointProblem:
         """Whether any position has a limit."""
         return bool(np.isfinite(self.position).any())
 
-    @property
-    def at_rest(self) -> bool:
-        """Whether it begins and ends at rest."""
-        return not (self.states[0].any() or self.states[-1].any())
-
     def inside(self, states: Array) -> Array:
         """Return states (K + 1, n, 2) moved inside the limits, and to the values that are given.
 

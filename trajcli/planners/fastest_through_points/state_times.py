@@ -28,20 +28,12 @@ class StateTimes:
 
     Attributes:
         alone: Fastest of each joint by itself, shape (K, n).
-        together: Shortest common duration of each segment, at least its given one, shape (K,); infinite where
-            there is none.
         slopes: Of `alone` by velocity and acceleration before and after, in units of their scales, shape
             (K, n, 4).
     """
 
     alone: Array
-    together: Array
     slopes: Array
-
-    @property
-    def duration(self) -> float:
-        """Of the whole motion."""
-        return float(self.together.sum())
 
 
 def durations(problem: WaypointProblem, states: Array) -> Array:
@@ -71,15 +63,8 @@ def durations(problem: WaypointProblem, states: Array) -> Array:
     return np.array(found)
 
 
-def state_times(problem: WaypointProblem, states: Array, together: Array | None = None) -> StateTimes:
-    """Return the durations between states (K + 1, n, 2), and their derivatives.
-
-    Args:
-        problem: Points and limits.
-        states: Inside the limits.
-        together: `durations(problem, states)`, where that is known.
-    """
-    common = durations(problem, states) if together is None else together
+def state_times(problem: WaypointProblem, states: Array) -> StateTimes:
+    """Return the durations between states (K + 1, n, 2) inside the limits, and their derivatives."""
     segments, joints = problem.steps.shape
     scales = problem.scales
     pairs = np.concatenate([states[:-1], states[1:]], axis=2)
@@ -96,7 +81,7 @@ def state_times(problem: WaypointProblem, states: Array, together: Array | None 
     changes = np.stack([times[1 + 2 * k] - times[2 + 2 * k] for k in range(4)], axis=2)
     spans = spans / np.concatenate([scales, scales], axis=1)
     slopes = np.where(np.isfinite(changes) & (spans > 0), changes / np.where(spans > 0, spans, 1.0), 0.0)
-    return StateTimes(times[0], common, slopes)
+    return StateTimes(times[0], slopes)
 
 
 def _box(problem: WaypointProblem) -> tuple[Array, Array]:

@@ -91,7 +91,7 @@ def improved(
     """
     if problem.segments == 1 or not np.isfinite(motion.duration):
         return motion
-    region, known = _FIRST, state_times(problem, motion.states, motion.times)
+    region, known = _FIRST, state_times(problem, motion.states)
     history = [motion.duration] * _PATIENCE
     for _ in range(rounds):
         late, gained = len(history) > 2 * _PATIENCE, history[-_PATIENCE] - motion.duration
@@ -105,7 +105,7 @@ def improved(
         gain = motion.duration - other.duration
         if gain > 0:
             motion = other
-            known = state_times(problem, motion.states, motion.times)
+            known = state_times(problem, motion.states)
         if gain >= _GOOD * foreseen:
             region = min(2 * region, _LARGEST)
         elif gain < _POOR * foreseen:
