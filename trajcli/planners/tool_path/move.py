@@ -196,7 +196,7 @@ class ToolPathMove(Planner):
         planned, target = self.path_from(forward(robot, start), robot), self.target
         if target is None or target.pinned is None:
             return planned
-        from trajcli.kinematics.following.pinning import with_pinned
+        from trajcli.kinematics.following.follower import with_pinned
 
         if planned.overlap is not None:
             hint = "leave `corner: overlap` out, or the joints"
