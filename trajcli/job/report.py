@@ -17,8 +17,14 @@ from trajcli.job.reports.comparisons import (
     ReferenceReport,
     SavingReport,
 )
-from trajcli.job.reports.efforts import EffortReport, EffortsReport, MountedToolReport, PayloadReport
-from trajcli.job.reports.flyby import FlyByReport, SignalReport
+from trajcli.job.reports.motion import (
+    EffortReport,
+    EffortsReport,
+    FlyByReport,
+    MountedToolReport,
+    PayloadReport,
+    SignalReport,
+)
 from trajcli.job.reports.part import (
     InSi,
     JointQuantity,

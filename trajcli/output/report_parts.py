@@ -8,8 +8,15 @@ from typing import TYPE_CHECKING, Literal
 
 from trajcli.job.report import MoveReport, Report
 from trajcli.job.reports.comparisons import SavingReport
-from trajcli.job.reports.efforts import EffortReport, EffortsReport, MountedToolReport, PayloadReport
-from trajcli.job.reports.flyby import BoundReport, FlyByReport, ZoneReport
+from trajcli.job.reports.motion import (
+    BoundReport,
+    EffortReport,
+    EffortsReport,
+    FlyByReport,
+    MountedToolReport,
+    PayloadReport,
+    ZoneReport,
+)
 from trajcli.kinematics.robot import QUANTITIES, JointType, Payload, Robot
 from trajcli.language.efforts import OF_ROBOT
 from trajcli.planning.plan import Plan

@@ -1,4 +1,4 @@
-"""Zones and signals in reports: what flying by the corners of a job gained, what each zone came to."""
+"""Efforts, loads, zones and signals in reports: what a motion takes, and what it does on its way."""
 
 from __future__ import annotations
 
@@ -12,6 +12,67 @@ from trajcli.job.reports.part import (
     UnitName,
     described,
 )
+
+
+class EffortReport(ReportPart):
+    """The extremes of what drives one joint in one move: inverse dynamics with what the tool carries."""
+
+    joint: str
+    low: Annotated[float, described("Smallest torque or force, N m or N.")]
+    low_time: Annotated[float, described("Where it is, seconds from the start of the trajectory.")]
+    high: Annotated[float, described("Largest torque or force, N m or N.")]
+    high_time: Annotated[float, described("Where it is, seconds from the start of the trajectory.")]
+    bound: Annotated[
+        tuple[float, float], described("It is proven to lie between these at every time, N m or N.")
+    ]
+    limit: Annotated[tuple[float | None, float | None], described("Bounds, N m or N; null is unlimited.")]
+    used: Annotated[float | None, described("Largest part of the bound that is used; null if unlimited.")]
+    head_room: Annotated[
+        float | None, described("What is left of the limit there, N m or N; negative beyond it.")
+    ]
+    gravity: Annotated[
+        float, described("Where most is used, what it takes to hold arm and payload, N m or N.")
+    ]
+    gravity_share: Annotated[
+        float, described("The same as part of the effort: above 1 where the motion helps.")
+    ]
+    unit: Literal["N m", "N"]
+    method: Literal["bounded"] = "bounded"
+
+
+class PayloadReport(ReportPart):
+    """What the tool carries."""
+
+    mass: Annotated[float, described("kg.")]
+    mass_unit: Literal["kg"] = "kg"
+    com: Annotated[list[float], MeasuredIn("com_unit"), described("Centre of mass in the tcp frame, m.")]
+    com_unit: UnitName = "m"
+    inertia: Annotated[
+        list[float], described("ixx, iyy, izz, ixy, ixz, iyz about the centre of mass, kg m^2.")
+    ]
+    inertia_unit: Literal["kg m^2"] = "kg m^2"
+
+
+class MountedToolReport(ReportPart):
+    """The tool on the flange."""
+
+    name: Annotated[str | None, described("By which the job calls it; null without one.")] = None
+    xyz: Annotated[list[float], MeasuredIn("xyz_unit"), described("Its tcp in the flange, m.")]
+    xyz_unit: UnitName = "m"
+    matrix: Annotated[list[list[float]], described("Orientation of its tcp in the flange.")]
+    load: Annotated[PayloadReport | None, described("Its own mass; null where nobody says it.")] = None
+
+
+class EffortsReport(ReportPart):
+    """Whether torques and forces were judged, and by which numbers."""
+
+    judged: Annotated[bool, described("Whether the effort of some joint was judged in some move.")]
+    reason: Annotated[str | None, described("Why not; null where they were.")] = None
+    inertials: Annotated[
+        str | None, described("Where masses and inertias come from; null where the robot has none.")
+    ] = None
+    gravity: Annotated[list[float], described("Acceleration of a body that falls, in world, m/s^2.")]
+    gravity_unit: Literal["m/s^2"] = "m/s^2"
 
 
 class ZoneReport(ReportPart):
