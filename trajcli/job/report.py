@@ -17,7 +17,7 @@ from trajcli.job.reports.comparisons import (
     ReferenceReport,
     SavingReport,
 )
-from trajcli.job.reports.motion import (
+from trajcli.job.reports.efforts_and_zones import (
     EffortReport,
     EffortsReport,
     FlyByReport,

@@ -37,7 +37,7 @@ from trajcli.job.report import (
     WaypointReport,
 )
 from trajcli.job.reports.comparisons import AtLimitReport
-from trajcli.job.reports.motion import FlyByReport, SignalReport
+from trajcli.job.reports.efforts_and_zones import FlyByReport, SignalReport
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.planners.planner import Event, PlannedMove

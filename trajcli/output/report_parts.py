@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from trajcli.job.report import MoveReport, Report
 from trajcli.job.reports.comparisons import SavingReport
-from trajcli.job.reports.motion import (
+from trajcli.job.reports.efforts_and_zones import (
     BoundReport,
     EffortReport,
     EffortsReport,
