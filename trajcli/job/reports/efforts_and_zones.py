@@ -1,4 +1,4 @@
-"""Efforts, loads, zones and signals in reports: what a motion takes, and what it does on its way."""
+"""Efforts, loads, zones and signals in reports."""
 
 from __future__ import annotations
 
