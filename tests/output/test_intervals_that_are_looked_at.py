@@ -59,8 +59,8 @@ def made_grid(rng: np.random.Generator, plan: Any, kind: str) -> Grid:
         return uniform
     local = np.append(uniform.local(0, uniform.count - 1), duration)
     if kind == "listed":
-        others = rng.uniform(0, duration, 5)
-        kept = [t for t in others if np.abs(t - local).min() > 1e-6]
+        others = np.sort(rng.uniform(0, duration, 5))
+        kept = [t for t in others[::2] if np.abs(t - local).min() > 1e-3]  # else the last bits are a jerk
         return ListedGrid(duration, 3.0 + np.unique([*local, *kept]), 3.0)
     at = np.unique(rng.integers(0, local.size, 3))
     states = np.stack([curve.evaluate(np.minimum(local[at], curve.end), order) for order in range(3)])
