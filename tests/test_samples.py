@@ -265,3 +265,29 @@ def test_a_row_beside_a_ramp_too_short_for_stamps_has_the_acceleration_outside_o
     expected = [1 / ramp if told else -0.6, 0.0, -1 / ramp if told else 0.6]
     np.testing.assert_allclose(rows[[0, 1, -1], 0], expected, rtol=1e-6, atol=1e-6)
     assert abs(rows[[0, -1], 1] - (0.0 if told else 0.6)).max() < 1e-6
+
+
+@pytest.mark.parametrize("off", [2e-10, 5e-10, 9e-10, 1.5e-9])
+def test_rows_before_a_break_do_not_know_of_short_pieces_elsewhere(off):
+    """The acceleration steps from 1 to 3 just behind the row at 0.5 s; a piece of 0.3 ns stands at 0.2 s."""
+    lengths = np.array([0.2, 3e-10, 0.3 - 3e-10 + off, 0.5 - off])
+    coefficients = np.zeros((3, 4, 1))
+    coefficients[0] = [[0.5], [1e9], [0.5], [1.5]]
+    whole = trajectory_of(PiecewisePolynomial(np.append(0.0, np.cumsum(lengths)), coefficients))
+    grid = UniformGrid(1.0, 10.0)
+    for size in (1, 2, 3, 100):
+        rows = np.concatenate([*sample(whole, grid, ("t", "qdd"), size=size)])
+        assert rows[:, 1] == pytest.approx([1.0] * 6 + [3.0] * 5)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rows_do_not_depend_on_the_size_of_blocks(seed):
+    """Of pieces of less than a nanosecond, at rows and within a nanosecond of rows, and of others."""
+    rng = np.random.default_rng(seed)
+    lengths = rng.choice([0.1, 0.05, 4e-10, 0.1 + 4e-10, 0.1 - 7e-10, 0.03], 30)
+    curve = PiecewisePolynomial(np.append(0.0, np.cumsum(lengths)), rng.normal(size=(4, 30, 2)))
+    grid = UniformGrid(curve.end, 20.0)
+    found = [
+        np.concatenate([*sample(trajectory_of(curve), grid, ALL, size=size)]) for size in (1, 2, 5, 4096)
+    ]
+    assert all(np.array_equal(rows, found[-1]) for rows in found)

@@ -189,12 +189,14 @@ def leave_short_pieces(
         rows: Shape (N, orders, n), the curve's units; written to.
         within: A piece that is no longer than this is too short, s.
     """
-    if (curve.lengths > within).all():
+    short = curve.lengths <= within
+    if not short.any():
         return
     first_of_end = curve.breaks[np.searchsorted(curve.breaks, curve.end - within)]
-    last = curve.breaks[np.searchsorted(curve.breaks, times + within, "right") - 1]
+    own, behind = (np.searchsorted(curve.breaks, each, "right") - 1 for each in (times, times + within))
+    last, before = curve.breaks[behind], np.append(0, np.cumsum(short))  # how many end before a break
     at_end = last == curve.end
-    beside = np.flatnonzero((last > times) & ~at_end)
+    beside = np.flatnonzero((before[behind] > before[own]) & ~at_end)
     for position, order in enumerate(orders):
         if order >= 2:
             rows[beside, position] = curve.evaluate(last[beside], order)

@@ -309,12 +309,12 @@ class JoinedRows:
         Knots behind steps of the acceleration state another position, rows near short pieces other rates.
         """
         grid, curve = self.grid, self.plan.trajectory.curve
-        breaks = curve.breaks if (curve.lengths <= NANOSECOND).any() else curve.breaks[:0]
+        short = curve.breaks[:-1][curve.lengths <= NANOSECOND]
         if not isinstance(grid, KnotGrid):
-            return breaks
+            return short
         times = grid.local[grid.at]
         off = np.abs(grid.states[0] - curve.evaluate(np.minimum(times + curve.start, curve.end)))
-        return np.sort(np.append(times[(off > _MOVED).any(axis=1)], breaks))
+        return np.sort(np.append(times[(off > _MOVED).any(axis=1)], short))
 
     def _steps(self, degree: int) -> NDArray[np.bool_]:
         """Return at which breaks a derivative steps that the rows state, shape (pieces + 1,)."""
