@@ -187,9 +187,9 @@ def test_other_grids_are_refused(b, words):
     ],
 )
 def test_resampling_is_not_advised_where_it_is_refused(b, words):
-    with pytest.raises(InputError, match=words) as caught:
+    with pytest.raises(InputError, match="different times") as caught:
         exactly(motion(), b)
-    assert "--resample" not in caught.value.problems[0].hint
+    assert words in caught.value.problems[0].hint
 
 
 def test_times_within_their_tolerance_are_those_of_one_grid():

@@ -155,13 +155,17 @@ def _common_row_count(a: Table, b: Table, times: tuple[Array, Array], slack: flo
             return count
         if times[short][-1] < times[1 - short][count - 1]:
             return count - 1
-    _require_increasing(a, times[0])
-    _require_increasing(b, times[1])
-    _rows_inside(a, b, *times)
+    hint = "--resample interpolates the second file at the times of the first"
+    try:
+        _require_increasing(a, times[0])
+        _require_increasing(b, times[1])
+        _rows_inside(a, b, *times)
+    except InputError as error:  # then it would be refused, too
+        hint = error.problems[0].message
     raise InputError(
         f"the rows stand at different times: {_grid(a.file, times[0])}, {_grid(b.file, times[1])}; "
         f"row {apart[0]} is at {times[0][apart[0]]:.12g} s and {times[1][apart[0]]:.12g} s",
-        hint="--resample interpolates the second file at the times of the first",
+        hint=hint,
     )
 
 
