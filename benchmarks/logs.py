@@ -55,7 +55,7 @@ def packed(compression):
 
     from trajcli.columns import parse_column
     from trajcli.streams.mcap.definitions import definition_of
-    from trajcli.streams.mcap.packing import RowRecords
+    from trajcli.streams.mcap.write import RowRecords
 
     kind, topics = "sensor_msgs/msg/JointState", {"/joint_states": 1, "/joint_accelerations": 2}
     columns = [parse_column(name) for name in COLUMNS]

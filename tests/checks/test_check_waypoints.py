@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from motions import between, trajectory
 
+from trajcli.checks.target import check_waypoints
 from trajcli.checks.verify import verify
-from trajcli.checks.via_points import check_waypoints
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.kinematics.robot import Limits
 from trajcli.trajectory import Promise, ViaPoints
@@ -61,7 +61,7 @@ def test_a_mutant_is_found(mutant, joint, time, value):
 @pytest.mark.parametrize("together", [1, 2, 100])
 def test_too_late_is_not_there(together, times, monkeypatch):
     """The point that is furthest off is named, once for each joint, in whichever block it is."""
-    monkeypatch.setattr("trajcli.checks.via_points._BLOCK", together)
+    monkeypatch.setattr("trajcli.checks.target._BLOCK", together)
     late = promise(times)
     found = check_waypoints(trajectory(passing()), [late])
     away = np.abs(passing().evaluate(late.times) - POINTS)
@@ -136,7 +136,7 @@ def test_of_each_move_that_misses_a_point_it_is_said():
 
 @pytest.mark.parametrize("together", [1, 2, 100])
 def test_each_point_has_its_own_distance(together, monkeypatch):
-    monkeypatch.setattr("trajcli.checks.via_points._BLOCK", together)
+    monkeypatch.setattr("trajcli.checks.target._BLOCK", together)
     missed = np.array([[0.0, 0.3], [0.2, 0.0], [0.0, 0.1]])
     assert check_waypoints(trajectory(passing()), [promise(points=POINTS - missed, missed=missed)]) == []
     (found,) = check_waypoints(

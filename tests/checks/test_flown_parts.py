@@ -21,7 +21,7 @@ from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Limits, Robot
 from trajcli.kinematics.zone import Zone, ZoneAround
-from trajcli.limits.parts import check_flown
+from trajcli.limits.kinds import check_flown
 from trajcli.trajectory import MoveInterval, Promise
 
 FREE = limits(2)

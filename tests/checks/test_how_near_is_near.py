@@ -10,7 +10,7 @@ from motions import between, limits, trajectory
 from test_check_tool import DURATION, JERK, LENGTH, SPEED, TURN, judged, kinds, moving, with_limits
 
 from trajcli.checks.continuity import check_continuity
-from trajcli.checks.via_points import check_waypoints
+from trajcli.checks.target import check_waypoints
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.limits.joints import peaks_by_move
 from trajcli.trajectory import Span, ViaPoints

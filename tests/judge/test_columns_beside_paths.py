@@ -16,7 +16,7 @@ from line_of_ur5e import plan
 from trajcli.columns import parse_column
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.findings import Finding
-from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
+from trajcli.judge.rows.tool_rows import ArmsOfMoves
 from trajcli.judge.tool_columns import ToolTable, judge_tool_columns
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.following.tolerance import Tolerance

@@ -11,7 +11,7 @@ import pytest
 
 from trajcli.columns import parse_column
 from trajcli.findings import Finding
-from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
+from trajcli.judge.rows.tool_rows import ArmsOfMoves
 from trajcli.judge.tool_columns import ToolTable, judge_tool_columns
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution

@@ -20,7 +20,7 @@ from trajcli.columns import parse_column
 from trajcli.findings import Finding
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.judge.recorded_tool import ToolJudge
-from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
+from trajcli.judge.rows.tool_rows import ArmsOfMoves
 from trajcli.judge.tool_columns import ToolTable, judge_tool_columns
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.forward import forward

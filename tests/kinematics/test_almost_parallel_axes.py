@@ -11,8 +11,8 @@ from conventions import screw
 
 from trajcli.geometry.pose import build
 from trajcli.job.dump import dump_job
+from trajcli.job.files.rail import on_carriage
 from trajcli.job.read import job_from_text
-from trajcli.kinematics.carriage import on_carriage
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.solve import solve

@@ -107,7 +107,7 @@ def test_points_take_little_more_memory_than_their_curve(
     """Of a million points that is what decides; blocks are made small, so that a few thousand are many."""
     for name in (
         "checks.continuity._BLOCK",
-        "checks.via_points._BLOCK",
+        "checks.target._BLOCK",
         "curves.extrema._PARTS",
         "curves.piecewise._ROWS",
         "curves.splines.cubic._ROWS",

@@ -14,10 +14,9 @@ from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.forward import forward
 from trajcli.planning.plan import plan_job
-from trajcli.player.compared import scene_of_two
 from trajcli.player.page import page_of
 from trajcli.player.recorded import scene_of_file
-from trajcli.player.scene import scene_of_plan
+from trajcli.player.scene import scene_of_plan, scene_of_two
 
 ARM = """\
 version: 1

@@ -237,7 +237,7 @@ def view(
     check_page_name(str(output))
     scene = _scene_of(source, robot, meshes)
     if beside is not None:
-        from trajcli.player.compared import scene_of_two
+        from trajcli.player.scene import scene_of_two
 
         scene = scene_of_two(scene, _scene_of(beside, robot, meshes))
     page = page_of(scene, compress=compress)

@@ -126,7 +126,7 @@ def verify(
         findings += check_targets(trajectory, promises)
         findings += _check_tools(tools)
         if any(promise.parts for promise in promises):
-            from trajcli.limits.parts import check_flown
+            from trajcli.limits.kinds import check_flown
 
             findings += check_flown(trajectory, promises)
     return Verdict(
@@ -319,7 +319,7 @@ def longest_factor(findings: Sequence[Finding]) -> float | None:
 def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Sequence[Finding]:
     if all(promise.via_points is None for promise in promises):
         return ()
-    from trajcli.checks.via_points import check_waypoints
+    from trajcli.checks.target import check_waypoints
 
     return check_waypoints(trajectory, [promise.via_points for promise in promises])
 
@@ -331,7 +331,7 @@ def _tools(moves: Sequence[LimitedMove], promises: Sequence[Promise]) -> Iterato
             continue
         parts = [move := moves[k]]
         if promise.parts:
-            from trajcli.limits.parts import limited_part
+            from trajcli.limits.kinds import limited_part
 
             flown = (limited_part(move.trajectory, move.span, part) for part in promise.parts)
             parts = [part for part in flown if part.span.duration > 0]

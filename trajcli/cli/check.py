@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from trajcli.cli.numbers import number
 from trajcli.cli.outcome import error_as_json, print_json, print_lines, print_remark, print_text, report_error
 from trajcli.cli.terminal import shown_table
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from trajcli.job.read import LoadedJob
     from trajcli.peers.motion_reference import MotionReference
     from trajcli.planning.plan import Plan
+    from trajcli.streams.byte_source import ByteSource
+
 
 _MOST, _FEW = 30, 4  # findings that a table lists: of those that are certain, and of each other group
 _JOINED = {
@@ -224,3 +228,34 @@ def _annotations(checked: CheckedFile, file: str) -> Iterator[Problem]:
 
 
 _RULES = ("limit", "continuity", "time", "derivative", "state", "path")
+
+
+def judged_file(source: ByteSource, options: CheckOptions, plan: Plan | None = None) -> CheckedFile | str:
+    """Return the judgement of a file; why there is none where nothing of it can be judged.
+
+    Args:
+        source: The file.
+        options: What it is judged by.
+        plan: Of a job that was planned before.
+    """
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is for the judge to find
+            return check_file(source, options, plan)
+    except TrajcliError as error:
+        return error.problems[0].text()
+
+
+def problems_of(checked: CheckedFile, *, every: bool) -> Iterator[Problem]:
+    """Yield what is certainly wrong with a file, the worst first.
+
+    Args:
+        checked: The file.
+        every: Whether each finding is said; otherwise the worst of each move and kind, with how many more.
+    """
+    alike: dict[object, list[Finding]] = {}
+    for index, finding in enumerate(checked.judgement.errors):
+        alike.setdefault(index if every else (finding.move, finding.kind), []).append(finding)
+    for group in alike.values():
+        problem = group[0].problem(f"{checked.motion.source}: {group[0].text(_say(checked))}")
+        more = f" (and {len(group) - 1} more like it: --all)" if len(group) > 1 else ""
+        yield replace(problem, message=problem.message + more)

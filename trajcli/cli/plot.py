@@ -70,7 +70,7 @@ def _checked_files(
     """Return the judgement of each file by the job; None, with a remark, where it cannot be judged."""
     if not sources:
         return []
-    from trajcli.cli.judged_file import judged_file
+    from trajcli.cli.check import judged_file
     from trajcli.judge.file import CheckOptions
 
     judged: list[CheckedFile | None] = []
@@ -96,7 +96,7 @@ def _refuse_findings(
         problems += verification_error(plan, every=every).problems
     for checked in judged:
         if checked is not None and not checked.judgement.passed:
-            from trajcli.cli.judged_file import problems_of
+            from trajcli.cli.check import problems_of
 
             problems += problems_of(checked, every=every)
     if problems:

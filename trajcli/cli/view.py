@@ -13,7 +13,7 @@ from trajcli.cli.progress import progress
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.frozen import frozen
 from trajcli.player.page import check_page_name, page_of
-from trajcli.player.scene import BUDGET
+from trajcli.player.scene import BUDGET, scene_of_plan, scene_of_two
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion, is_job
 from trajcli.streams.whole_file import refuse_overwriting, standard_output, whole_file
@@ -59,8 +59,6 @@ def write_comparison(first: str, second: str, output: str, robot: str | None) ->
         InputError: When they do not fit each other, the arm, or what a page is called.
         FileError: When one cannot be read, or the page not be written.
     """
-    from trajcli.player.compared import scene_of_two
-
     _check_output(output)
     shown = [_shown_file(name, robot, output, BUDGET) for name in (first, second)]
     page = page_of(scene_of_two(*(one.scene for one in shown)))
@@ -81,8 +79,6 @@ def _written(shown: Sequence[_Shown], options: ViewCommand) -> int:
     """Write the page, say what it shows, and raise what is wrong with it."""
     scene = shown[0].scene
     if len(shown) > 1:
-        from trajcli.player.compared import scene_of_two
-
         scene = scene_of_two(scene, shown[1].scene)
     page = page_of(scene, compress=options.compress)
     _write(page, options.output)
@@ -99,7 +95,6 @@ def _written(shown: Sequence[_Shown], options: ViewCommand) -> int:
 def _shown_job(name: str, options: ViewCommand, every: bool) -> _Shown:
     from trajcli.job.read import files_of, load_job
     from trajcli.output.delivery.delivered import plan_of
-    from trajcli.player.scene import scene_of_plan
 
     loaded = load_job(name, options.override)
     _check_inputs_stay(options.output, files_of(loaded.document))
@@ -127,14 +122,14 @@ def _shown_file(
     said = f"{scene['title']}: {scene['verdict']['text']}, {scene['subtitle']}"
     if checked is None or isinstance(checked, str) or checked.judgement.passed:
         return _Shown(scene, said, None)
-    from trajcli.cli.judged_file import problems_of
+    from trajcli.cli.check import problems_of
 
     return _Shown(scene, said, lambda: problems_of(checked, every=every))
 
 
 def _checked_or_reason(source: ByteSource, robot: str) -> CheckedFile | str:
     """Return the judgement of a file by a job, or by the limits of a robot; else why there is none."""
-    from trajcli.cli.judged_file import judged_file
+    from trajcli.cli.check import judged_file
     from trajcli.judge.file import CheckOptions
     from trajcli.queries.arm import names_job
 

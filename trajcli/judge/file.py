@@ -276,7 +276,7 @@ def _of_tool_columns(
     """
     if given.loaded is None or given.robot.convention is None or motion.format not in _NAMED:
         return [], set()
-    from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
+    from trajcli.judge.rows.tool_rows import ArmsOfMoves
     from trajcli.judge.tool_columns import judge_tool_columns, open_tool_table
     from trajcli.planning.planned_move import path_of_tool
 

@@ -22,8 +22,8 @@ from trajcli.frozen import frozen
 from trajcli.geometry.rotation import log, matrix_from_quaternion
 from trajcli.judge.motion import MotionJudge, Requirements
 from trajcli.judge.rounding import stated_errors
-from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
 from trajcli.judge.rows.planned_rows import halves_of
+from trajcli.judge.rows.tool_rows import ArmsOfMoves
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.forward import forward

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from importlib import import_module
 from math import isfinite
@@ -11,17 +12,18 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amounts
-from trajcli.findings import Finding, NamedJoints
+from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.trajectory import Span, State, Trajectory
+from trajcli.trajectory import MoveInterval, Promise, Span, State, Trajectory
 
 if TYPE_CHECKING:
-    from trajcli.curves.piecewise import PiecewisePolynomial
     from trajcli.curves.time_optimal.constraints import PathConstraint
     from trajcli.kinematics.following.motion import ToolMotion
+    from trajcli.kinematics.zone import ZoneAround
+
 
 ToolLimit = Literal["speed", "acceleration", "jerk", "angular_speed", "angular_acceleration", "angular_jerk"]
 """Keys of the limits of the tool."""
@@ -262,3 +264,55 @@ def families(limits: Limits, *, further: bool = False) -> Iterator[tuple[str, Li
 @lru_cache(maxsize=8)  # the moves of a job have the same limits, nearly all
 def _stated(limits: Limits) -> tuple[LimitKind, ...]:
     return tuple(kind for kind in KINDS if kind.stated(limits))
+
+
+def check_flown(trajectory: Trajectory, promises: Sequence[Promise]) -> Iterator[Finding]:
+    """Yield what is wrong with the parts of moves that fly by corners.
+
+    Args:
+        trajectory: What to judge.
+        promises: What each span says of itself.
+    """
+    for span, promise in zip(trajectory.spans, promises, strict=True):
+        for part in promise.parts:
+            move = limited_part(trajectory, span, part)
+            if move.span.duration > 0:
+                yield from part_findings(move, part.around)
+
+
+def limited_part(trajectory: Trajectory, span: Span, part: MoveInterval) -> LimitedMove:
+    """Return a part of a move with its limits."""
+    within = replace(span, start=span.start + part.start, end=min(span.start + part.end, span.end))
+    return LimitedMove(trajectory, within, part.robot.limits, part.robot, part.tool)
+
+
+def part_findings(move: LimitedMove, around: ZoneAround | None) -> Iterator[Finding]:
+    """Yield the limits that a part of a move does not keep, and where it leaves its zone.
+
+    Args:
+        move: The part.
+        around: Its zone; None on a path.
+    """
+    for _, family in families(move.limits):
+        survey = family.survey(move)
+        if survey is not None:
+            for finding in survey.over(move.trajectory, move.trajectory.curve.start):
+                yield replace(finding, move=move.span.index)
+    if around is None:
+        return
+    from trajcli.kinematics.zone import ZONE_RELATIVE
+
+    share, when = around.largest_share(PiecewisePolynomial(*move.pieces))
+    if share <= 1 + ZONE_RELATIVE:
+        return
+    how = f"{share:.9g} times as far from its corner as it may be"
+    yield Finding(
+        move=move.span.index,
+        kind="zone",
+        value=share,
+        limit=1.0,
+        time=when,
+        method="bounded",
+        hint="this is a bug: report it",
+        message=f"the motion leaves its zone: it is {how} {at_time(when)}",
+    )

@@ -1,9 +1,9 @@
-"""Scene of a planned job: what a page shows of its arm, its motion, its limits and its verdict."""
+"""Scene of a planned job, or of two motions: what a page shows of arm, motion, limits and verdict."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from trajcli.columns import EFFORT
 from trajcli.curves.piecewise import Array
+from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.grids import AT_BREAK
 from trajcli.kinematics.robot import QUANTITIES, JointType, Limits, Robot
@@ -29,6 +30,8 @@ _MOST_WAYPOINTS = 40
 _MOST_STEPS = 100
 _SAME = 1e-4  # rad or m: waypoints that are nearer than this are one
 _MADE_BY = f"Made by trajcli {__version__}"
+_OF_OTHER = ("title", "subtitle", "verdict", "joints", "robot", "length", "tool", "rows", "loads")
+"""What a page shows of the second motion."""
 
 
 def scene_of_plan(plan: Plan, meshes: float = BUDGET) -> dict[str, Any]:
@@ -347,3 +350,42 @@ def _notes(plan: Plan) -> Iterator[str]:
 
 def _counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def scene_of_two(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the scene of two motions of one kind of arm; limits, moves and marks are those of the first.
+
+    Args:
+        first: A scene, as of a plan or a file.
+        second: Another.
+
+    Raises:
+        InputError: When their joints are not of the same number and kinds.
+    """
+    kinds = [[_kind(joint) for joint in scene["joints"]] for scene in (first, second)]
+    if len(kinds[0]) != len(kinds[1]):
+        counts = [f"{scene['title']} has {len(scene['joints'])}" for scene in (first, second)]
+        raise InputError(
+            f"the motions have not as many joints: {counts[0]}, {counts[1]}", hint="view each alone"
+        )
+    for number, pair in enumerate(zip(*kinds, strict=True)):
+        if "?" not in pair and pair[0] != pair[1]:
+            names = [f"{kind} in {scene['title']}" for kind, scene in zip(pair, (first, second), strict=True)]
+            raise InputError(f"joint {number + 1} is {' and '.join(names)}", hint="view each alone")
+    other = {key: second[key] for key in _OF_OTHER if key in second}
+    notes = [f"{second['title']}: {note}" for note in second["notes"]]
+    findings = [f"{second['title']}: {one['label']} {one['message']}" for one in _worst(second)]
+    return {
+        **first,
+        "other": {**other, "moves": second["moves"]},
+        "notes": [*first["notes"], *findings, *notes],
+    }
+
+
+def _worst(scene: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return [scene["findings"][cause[0]] for cause in scene["causes"]]
+
+
+def _kind(joint: Mapping[str, Any]) -> str:
+    unit = joint["units"][0]
+    return "?" if " or " in unit else {"deg": "an angle", "rad": "an angle"}.get(unit, "a length")

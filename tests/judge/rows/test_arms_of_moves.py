@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trajcli
-from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
+from trajcli.judge.rows.tool_rows import ArmsOfMoves
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import MountedTool, Robot
 

@@ -13,8 +13,7 @@ from two_moves import TWO_MOVES
 from trajcli.columns import parse_column
 from trajcli.errors import InputError, PlanningError
 from trajcli.judge.rows import tool_rows
-from trajcli.judge.rows.arms_of_moves import ArmsOfMoves
-from trajcli.judge.rows.tool_rows import joints_found_back
+from trajcli.judge.rows.tool_rows import ArmsOfMoves, joints_found_back
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from ruckig import InputParameter, Ruckig, Trajectory
 
-from trajcli.planners.fastest_through_points.bound import shortest_duration
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
+from trajcli.planners.fastest_through_points.state_times import shortest_duration
 
 VELOCITY, ACCELERATION, JERK = [-0.6, 1.0], [-8.0, 3.0], 20.0
 

@@ -13,10 +13,10 @@ from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen
-from trajcli.planners.fastest_through_points.bound import shortest_duration
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.search import search
 from trajcli.planners.fastest_through_points.segment_motion import PointMotion, exact_motion
+from trajcli.planners.fastest_through_points.state_times import shortest_duration
 from trajcli.planners.fastest_through_points.states import StateMotion, evaluated
 from trajcli.planners.fastest_through_points.straight import straight_motion, straight_stretches
 

@@ -3,23 +3,30 @@
 Ruckig takes many joints at once, each by itself where none waits for another: all states of a list, and all
 that differences need, cost one call.
 
+What a joint needs between the points at which it turns bounds the whole motion, and so does the sum over
+segments of what the slowest joint needs at its velocity limit, and the fastest motion of a joint from start
+to target that leaves out all points between.
+
 Source: Berscheid and Kroeger (2021).
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
+from trajcli.curves.turning_bound import MonotoneStretches, durations_by_joint, turning_points
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 
 _ROOM = 1 + 1e-9  # of a limit: what is outside by less is left to ruckig
 _DIFFERENCE = 1e-5  # of the scale of a state
+_SOLVED = 1e-9  # relative: the accuracy of ruckig's durations
 
 
 @frozen
@@ -75,8 +82,8 @@ def state_times(problem: WaypointProblem, states: Array) -> StateTimes:
     trial = np.clip(pairs + moves * sizes, *_box(problem))
     steps = np.broadcast_to(problem.steps, trial.shape[:3])
     times = alone_times(problem, steps, trial)
-    known = np.isfinite(times)  # beyond the limits there is none: then the other side alone says it
-    trial, times = np.where(known[..., None], trial, trial[0]), np.where(known, times, times[0])
+    finite = np.isfinite(times)  # beyond the limits there is none: then the other side alone says it
+    trial, times = np.where(finite[..., None], trial, trial[0]), np.where(finite, times, times[0])
     spans = np.stack([(trial[1 + 2 * k] - trial[2 + 2 * k])[..., k] for k in range(4)], axis=2)
     changes = np.stack([times[1 + 2 * k] - times[2 + 2 * k] for k in range(4)], axis=2)
     spans = spans / np.concatenate([scales, scales], axis=1)
@@ -198,3 +205,27 @@ def set_limits(wanted: Any, velocity: Array, acceleration: Array, jerk: Array) -
     wanted.min_velocity, wanted.max_velocity = velocity.T.tolist()
     wanted.min_acceleration, wanted.max_acceleration = acceleration.T.tolist()
     wanted.max_jerk = jerk.tolist()
+
+
+def shortest_duration(problem: WaypointProblem) -> tuple[float, int | None]:
+    """Return a proven lower bound of the duration, s, and the joint that needs it; None: several together."""
+    problem = replace(problem, jerk=problem.jerk * problem.looser)
+    ends = np.concatenate([problem.states[0], problem.states[-1]], axis=1)
+    direct = alone_times(problem, problem.points[-1] - problem.points[0], ends)
+    direct = np.where(np.isfinite(direct), direct * (1 - _SOLVED), 0.0)
+    between_turns = durations_by_joint([_stretches(problem, joint) for joint in range(problem.joints)])
+    by_joint = np.maximum(between_turns, direct).tolist()
+    together = float(problem.times_at_speed.sum())
+    worst = int(np.argmax(by_joint))
+    if by_joint[worst] >= together:
+        return by_joint[worst], worst
+    return together, None
+
+
+def _stretches(problem: WaypointProblem, joint: int) -> MonotoneStretches:
+    turns = turning_points(problem.points[:, joint])
+    steps = np.diff(turns, prepend=turns[0])
+    ends = problem.states[[0, -1], joint]
+    along = ends[:, 0] * np.sign(steps[[min(1, steps.size - 1), -1]])
+    bounds = problem.velocity[joint], problem.acceleration[joint], problem.jerk[joint] * np.array([-1.0, 1.0])
+    return MonotoneStretches.between(turns, bounds, np.maximum(along, 0.0), (ends != 0.0).any(axis=1))

@@ -16,9 +16,9 @@ from trajcli.curves.operations import along_line, times_at
 from trajcli.curves.piecewise import Array
 from trajcli.curves.turning_bound import bounds_along
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
-from trajcli.planners.fastest_through_points.bound import shortest_duration
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.segment_motion import PointMotion, exact_motion, joined
+from trajcli.planners.fastest_through_points.state_times import shortest_duration
 from trajcli.planners.planner import Phase
 
 _ON_LINE = 1e-10  # of a stretch's length: a point this near to the line lies on it

@@ -19,7 +19,7 @@ from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
 from trajcli.kinematics.robot import Robot
-from trajcli.limits.parts import limited_part, part_findings
+from trajcli.limits.kinds import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.chain_parts import ChainPart, PathPart, joint_rates
