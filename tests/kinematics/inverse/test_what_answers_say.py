@@ -1,0 +1,106 @@
+"""What answers say beside joints: tool axes that no joint turns, whether another orientation helps, joints that are free."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from inverse_arms import arm, gap
+
+from trajcli.errors import InputError
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.solve import reached_if_turned, solve
+from trajcli.kinematics.inverse.target import partial_target
+from trajcli.kinematics.robot import Robot
+
+PLACE = np.array([0.35, 0.2, 0.3])
+ON_ITS_SIDE = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+)
+"""T_world_base of an arm whose z axis is the world's x axis."""
+
+
+def lying(robot: Robot) -> Robot:
+    return replace(robot, base=ON_ITS_SIDE)
+
+
+@pytest.mark.parametrize(("axis", "unturned"), [("z", "z"), ("x", None), ("y", None)])
+@pytest.mark.parametrize(
+    "given", [{"direction": [1.0, 0.0, 0.0]}, {"direction": [0.0, 0.0, -1.0]}, {"pitch": 0.3}]
+)
+def test_an_axis_that_no_joint_turns_is_named(given: dict, axis: str, unturned: str | None) -> None:
+    """That of a SCARA's tool along its own joints, whether or not it can be met."""
+    found = solve(arm("SCARA"), partial_target(PLACE, tool_axis=axis, **given))  # type: ignore[arg-type]
+    assert found.fixed_axis == unturned
+    assert solve(arm("UR"), partial_target(PLACE, tool_axis=axis, **given)).fixed_axis is None  # type: ignore[arg-type]
+
+
+def test_a_yaw_of_an_axis_that_stays_vertical_is_refused_and_of_one_that_lies_is_not() -> None:
+    with pytest.raises(InputError, match="always vertical and has no yaw") as caught:
+        solve(arm("SCARA"), partial_target(PLACE, yaw=0.3))
+    assert caught.value.problems[0].hint == "say which axis of the tool heads there, with `tool_axis: x or y`"
+    solve(arm("SCARA"), partial_target(PLACE, yaw=0.3, tool_axis="x"))
+    assert solve(lying(arm("SCARA")), partial_target(PLACE, yaw=0.3)).fixed_axis == "z"
+    solve(arm("UR"), partial_target(PLACE, yaw=0.3))
+
+
+def test_another_orientation_helps_where_the_coordinates_that_count_are_within_reach() -> None:
+    flat = arm("planar 2R")
+    above = np.array([0.3, 0.2, 5.0])
+    assert reached_if_turned(flat, partial_target(above, fixed=(True, True, False), direction=[0, 0, 1.0]))
+    assert not reached_if_turned(flat, partial_target(above, direction=[0, 0, 1.0]))
+    assert not reached_if_turned(flat, partial_target([0.3, 0.2, 0.0]))  # it has none, and is met
+    assert not reached_if_turned(flat, partial_target([3.0, 0.2, 0.0], direction=[0, 0, 1.0]))
+
+
+@pytest.mark.parametrize("name", ["planar 2R", "planar RP"])
+@pytest.mark.parametrize("side", [False, True])
+def test_a_coordinate_across_the_plane_of_an_arm_need_not_count(name: str, side: bool) -> None:
+    """Wherever its base has that plane: both answers are those of the whole position, by the closed form."""
+    robot = lying(arm(name)) if side else arm(name)
+    q = np.array([0.7, 0.5])
+    position = forward(robot, q[None])[0, :3, 3]
+    plane_normal = robot.base[:3, :3] @ (
+        np.array([0.0, 0.0, 1.0]) if name == "planar 2R" else normal_of(robot)
+    )
+    across = int(np.abs(plane_normal).argmax())
+    fixed = tuple(k != across for k in range(3))
+    moved = position + 7.0 * np.eye(3)[across]
+    found = solve(robot, partial_target(moved, fixed=fixed))  # type: ignore[arg-type]
+    whole = solve(robot, partial_target(position))
+    assert found.method == whole.method
+    assert found.count == whole.count == 2
+    assert min(gap(robot, each, q) for each in found.joints[found.valid]) < 1e-9
+    assert np.abs(found.joints - whole.joints).max() < 1e-9
+
+
+def normal_of(robot: Robot) -> np.ndarray:
+    """Return the normal of the plane in which an arm of two joints moves, in its base."""
+    bare = replace(robot, base=np.eye(4))
+    rng = np.random.default_rng(3)
+    points = forward(bare, rng.uniform(0.1, 1.0, (20, 2)))[:, :3, 3]
+    return np.linalg.svd(points - points.mean(axis=0))[2][2]
+
+
+def test_one_coordinate_that_counts_leaves_an_arm_answers_by_search() -> None:
+    """Of two that do not count one lies in the plane of the arm."""
+    robot = arm("planar 2R")
+    for fixed in ((True, False, False), (False, True, False)):
+        found = solve(robot, partial_target([0.3, 0.3, 9.0], fixed=fixed), near=[0.1, 0.2])  # type: ignore[arg-type]
+        assert found.valid.any()
+        reached = forward(robot, found.joints[found.valid])[:, :3, 3]
+        assert np.abs(reached[:, fixed.index(True)] - 0.3).max() < 1e-9
+        grid = np.stack(np.meshgrid(*[np.linspace(-np.pi, np.pi, 401)] * 2), axis=-1).reshape(-1, 2)
+        meet = np.abs(forward(robot, grid)[:, fixed.index(True), 3] - 0.3) < 5e-3
+        nearest = np.linalg.norm(grid[meet] - [0.1, 0.2], axis=1).min()
+        assert np.linalg.norm(found.joints[found.valid] - [0.1, 0.2], axis=1).min() <= nearest + 0.02
+
+
+def test_a_yaw_of_an_axis_that_is_vertical_at_zero_but_turned_by_a_wrist_is_no_fault() -> None:
+    robot = arm("wrist over SCARA")
+    home = forward(robot, np.zeros((1, 6)))[0, :3, :3]
+    vertical = [axis for k, axis in enumerate("xyz") if abs(home[2, k]) > 0.999]
+    assert vertical
+    for axis in vertical:
+        assert solve(robot, partial_target(PLACE, yaw=0.3, tool_axis=axis)).fixed_axis is None  # type: ignore[arg-type]
