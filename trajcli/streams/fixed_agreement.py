@@ -115,7 +115,7 @@ class FixedLayout:
         columns = np.flatnonzero(~self._fixed)
         ends = self._ends[:, columns] + (_WINDOW - 1)  # of the separators
         expected = np.where(columns == self._fixed.size - 1, ord("\n"), ord(","))
-        if (buffer[ends] != expected).any() or self._negative[:, columns].any():
+        if (buffer[ends] != expected).any():
             return False
         words = np.ndarray(buffer.size - 7, dtype="<u8", buffer=buffer, strides=(1,))
         lengths = self._digits[:, columns].astype(np.intp) + 1
