@@ -140,7 +140,6 @@ def _counts(finding: Finding, *, strict: bool) -> bool:
 
 
 def _part(rows: RecordedMotion, part: slice) -> RecordedMotion:
-    """Return some rows."""
     names = (*ORDERS, "tau", "move")
     values: dict[str, Any] = {
         name: None if (found := getattr(rows, name)) is None else found[part] for name in names

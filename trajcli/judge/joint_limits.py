@@ -307,7 +307,6 @@ class _FastApproaches:
         return np.asarray(towards - np.abs(self.bound) > self.rounding)
 
     def finding(self, run: JudgedRun, k: int) -> Finding:
-        """Return one of them as a finding."""
         from trajcli.curves.approach import ApproachUse
         from trajcli.limits.velocity_by_position import approach_excess
 

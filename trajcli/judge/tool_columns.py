@@ -160,7 +160,6 @@ class _Judge:
             self._compare_along_paths(motion, values[:, self._table.index("path")], poses, errors[0])
 
     def findings(self) -> list[Finding]:
-        """Return what was found."""
         found = list(self._worst.findings())
         for move, judge in [(-1, self._rates), *self._laws]:
             if judge is not None:

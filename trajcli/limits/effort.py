@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from trajcli.curves.piecewise import Array
 from trajcli.dynamics.effort_bound import (
     EffortPeak,
     EffortSurvey,
@@ -18,7 +19,7 @@ from trajcli.dynamics.effort_bound import (
     needed_stretch,
 )
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.errors import Amount, Amounts
+from trajcli.errors import Amount, Amounts, Problem
 from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
@@ -114,6 +115,46 @@ def effort_excess(
         amounts=amounts,
         method="bounded",
     )
+
+
+def gravity_problem(
+    robot: Robot,
+    joint: int,
+    needed: float,
+    limit: float,
+    position: Array,
+    *,
+    rubs: bool,
+    time: float | None = None,
+) -> Problem:
+    """Return the problem of a joint that gravity alone takes over its limit.
+
+    Args:
+        robot: The arm.
+        joint: Index.
+        needed: What holds the joint, N m or N.
+        limit: On that side.
+        position: Of all joints there, (n,), rad or m.
+        rubs: Whether friction is part of what holds it.
+        time: From the start of the move, s; None where it is not known.
+    """
+    name, unit = robot.joint_names[joint], effort_unit(robot.joint_types[joint])
+    amounts: Amounts = {
+        "joint": name,
+        "needed": Amount(needed, unit=unit),
+        "limit": Amount(limit, unit=unit),
+        "more": Amount(abs(needed) - abs(limit), unit=unit),
+        **{f"q{k}": Amount(value, 0, k) for k, value in enumerate(position.tolist())},
+    }
+    cause = "gravity with friction" if rubs else "gravity"
+    when = "" if time is None else f"at t = {time:.6g} s of the move, "
+    where = ", ".join(f"{{q{k}}}" for k in range(position.size))
+    message = (
+        f"{cause} alone takes {{needed}} of {{joint}} {when}with the joints at {where}: "
+        "{more} more than its effort limit of {limit}"
+    )
+    hint = "no duration helps: carry less, go another way, or raise the limit"
+    return Problem(message, hint, joint=name, time=time, value=needed, limit=limit, amounts=amounts)
 
 
 class EffortFamily(LimitFamily):

@@ -83,7 +83,6 @@ def explanation(
 
 
 def _move(plan: Plan, index: int, report: MoveReport, *, derivatives: bool) -> ExplainedMove:
-    """Return what there is to say about a move."""
     move, units = plan.moves[index], plan.loaded.units
     names, planned = move.robot.joint_names, move.planned
     arrivals, tool = planned.arrivals, path_of_tool(move)

@@ -348,7 +348,6 @@ def _tool(trajectory: Trajectory, span: Span, move: PlannedMove) -> ToolReport |
 
 
 def _segments(run: SpeedRun, span: Span) -> SegmentSpeedsReport:
-    """Return the report of segments with the same limits of speed."""
     from trajcli.limits.kinds import SPEED_KINDS
 
     peaks = [

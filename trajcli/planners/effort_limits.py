@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import PlanningError
 from trajcli.kinematics.robot import Robot
-from trajcli.units import effort_unit
 
 if TYPE_CHECKING:
     from trajcli.curves.time_optimal.constraints import PathConstraint
@@ -155,23 +154,8 @@ def _slower(motion: TimeOptimalMotion, factor: float) -> TimeOptimalMotion:
 
 def _held(error: HeldOverLimitError, path: PiecewisePolynomial, robot: Robot) -> PlanningError:
     """Return the error that names joint and place, and says by how much gravity is over the limit."""
-    joint = error.joint
-    name, unit = robot.joint_names[joint], effort_unit(robot.joint_types[joint])
+    from trajcli.limits.effort import gravity_problem
+
+    rubs = robot.joints[error.joint].friction.coulomb > 0.0
     position = path.evaluate(error.s)
-    amounts: Amounts = {
-        "joint": name,
-        "needed": Amount(error.effort, unit=unit),
-        "limit": Amount(error.limit, unit=unit),
-        "more": Amount(abs(error.effort) - abs(error.limit), unit=unit),
-        **{f"q{k}": Amount(value, 0, k) for k, value in enumerate(position.tolist())},
-    }
-    where = ", ".join(f"{{q{k}}}" for k in range(position.size))
-    rubs = robot.joints[joint].friction.coulomb > 0.0
-    cause = "gravity with friction" if rubs else "gravity"
-    message = (
-        f"{cause} alone takes {{needed}} of {{joint}} with the joints at {where}: "
-        "{more} more than its effort limit of {limit}"
-    )
-    hint = "no duration helps: carry less, go another way, or raise the limit"
-    problem = Problem(message, hint, joint=name, value=error.effort, limit=error.limit, amounts=amounts)
-    return PlanningError(problem)
+    return PlanningError(gravity_problem(robot, error.joint, error.effort, error.limit, position, rubs=rubs))

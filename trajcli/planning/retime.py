@@ -21,7 +21,6 @@ from trajcli.limits.kinds import (
 )
 from trajcli.planners.planner import LITTLE, Event, Planned, PlannedMove, Planner
 from trajcli.trajectory import State
-from trajcli.units import effort_unit
 
 LONGEST = 1e4
 """Times the planned duration: a move that needs more is not over its limit, it is wrong."""
@@ -238,7 +237,6 @@ def _slowed(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def _limit_of(finding: Finding) -> LimitKind:
-    """Return the limit that a finding is about."""
     return STEPS_OF_TOOL.get(finding.kind) or KIND_OF[finding.kind]
 
 
@@ -251,7 +249,7 @@ def require_holdable(move: PlannedMove) -> None:
         PlanningError: With the joint, the place and by how much.
         InputError: When a link of the arm has no inertia, or the arm no geometry.
     """
-    from trajcli.limits.effort import EffortFamily
+    from trajcli.limits.effort import EffortFamily, gravity_problem
 
     trajectory = move.alone()
     limited = LimitedMove(trajectory, trajectory.spans[0], move.robot.limits, move.robot)
@@ -260,25 +258,9 @@ def require_holdable(move: PlannedMove) -> None:
     if over is None:
         return
     joint, limit, peak = over
-    name, unit = move.robot.joint_names[joint], effort_unit(move.robot.joint_types[joint])
-    position = trajectory.curve.evaluate(peak.time)
-    amounts: Amounts = {
-        "joint": name,
-        "needed": Amount(copysign(peak.static, limit), unit=unit),
-        "limit": Amount(limit, unit=unit),
-        "more": Amount(peak.static - abs(limit), unit=unit),
-        **{f"q{k}": Amount(value, 0, k) for k, value in enumerate(position.tolist())},
-    }
-    where = ", ".join(f"{{q{k}}}" for k in range(position.size))
-    cause = "gravity with friction" if peak.parts[2] else "gravity"
-    message = (
-        f"{cause} alone takes {{needed}} of {{joint}} at t = {peak.time:.6g} s of the move, "
-        f"with the joints at {where}: {{more}} more than its effort limit of {{limit}}"
-    )
-    hint = "no duration helps: carry less, go another way, or raise the limit"
-    value = copysign(peak.static, limit)
+    needed, position = copysign(peak.static, limit), trajectory.curve.evaluate(peak.time)
     raise PlanningError(
-        Problem(message, hint, joint=name, time=peak.time, value=value, limit=limit, amounts=amounts)
+        gravity_problem(move.robot, joint, needed, limit, position, rubs=bool(peak.parts[2]), time=peak.time)
     )
 
 

@@ -115,7 +115,6 @@ def _strip(block: PanelBlock, borders: MoveBorders | None) -> float:
 
 
 def _time_range(block: PanelBlock, borders: MoveBorders | None) -> tuple[float, float]:
-    """Return the range of times of all panels of a block."""
     times = [trace.x for panel in block.panels for trace in panel.traces]
     known = np.concatenate([*times, *([] if borders is None else [borders.times])])
     low, high = float(known.min()), float(known.max())

@@ -278,7 +278,6 @@ class _Maker:
         return PanelBlock(tuple(panels), 2)
 
     def views(self) -> PathViews:
-        """Return the path of the tool."""
         scale, motion = self._display.factor("length"), self._motion
         traces: list[tuple[int, Array]] = []
         if motion is not None:

@@ -13,7 +13,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coef
 from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
-from trajcli.limits.kinds import KINDS, SPEED_KINDS, narrowings
+from trajcli.limits.kinds import KINDS, SPEED_KINDS, limited_part, narrowings
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.plots.display_units import DisplayUnits
@@ -159,11 +159,7 @@ class PlannedMotion:
         """Return the intervals of a move in which limits of the tool's speed step along its path."""
         move, span = self.moves[index], self.plan.trajectory.spans[index]
         motions = [(span, move.planned.tool)] + [
-            (
-                replace(span, start=span.start + part.start, end=min(span.start + part.end, span.end)),
-                part.tool,
-            )
-            for part in move.planned.parts
+            (limited_part(self.plan.trajectory, span, part).span, part.tool) for part in move.planned.parts
         ]
         runs: list[SpeedRun] = []
         for within, motion in motions:

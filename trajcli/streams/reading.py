@@ -140,7 +140,7 @@ def _rows_of_format(
     if kind == "ros":
         return _message(source)
     if kind == "jsonl":
-        from trajcli.streams.json_rows import JsonRows
+        from trajcli.streams.jsonl import JsonRows
 
         return JsonRows(source)
     if kind == "npy":
@@ -183,7 +183,7 @@ def format_of_rows(source: ByteSource) -> str:
         return _BY_ENDING[source.ending]
     first = head.removeprefix(BOM_UTF8).lstrip().split(b"\n", maxsplit=1)[0]
     if first.startswith(b"{"):
-        from trajcli.streams.json_rows import is_json_object
+        from trajcli.streams.jsonl import is_json_object
 
         if is_json_object(first) and not _JOINT_NAMES.match(first):
             return "jsonl"

@@ -107,7 +107,6 @@ class _EndState:
     acceleration: Array
 
     def of(self, columns: slice) -> _EndState:
-        """Return the state of some components."""
         return _EndState(self.position[columns], self.velocity[columns], self.acceleration[columns])
 
     def backwards(self) -> _EndState:

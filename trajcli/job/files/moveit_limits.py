@@ -204,7 +204,6 @@ class _JointEntry:
             self._refuse(f"expected a mapping, got {shown(value)}")
 
     def bounds(self) -> dict[str, LowerUpper]:
-        """Return the bounds by quantity."""
         for key in self._given:
             meant = None if key in (*_KEYS, *_IGNORED) else nearest(key, _KEYS)
             if meant is not None:

@@ -51,11 +51,9 @@ class _ToolRows:
     values: Array
 
     def index(self, kind: str) -> int | None:
-        """Return which column is of a kind; None where none is."""
         return next((k for k, column in enumerate(self.columns) if column.kind == kind), None)
 
     def has(self, group: str) -> bool:
-        """Return whether all columns of a group are there."""
         return all(self.index(kind) is not None for kind in kinds_of(group))
 
     def group(self, group: str) -> Array:

@@ -117,7 +117,6 @@ class JoinedRows:
     def _judgement(
         self, begun: Judgement, worst: _Collectors, tool: ToolJudge | None, slack: float
     ) -> Judgement:
-        """Return the judgement with what was found."""
         findings = (*worst.findings(), *(() if tool is None else tool.findings()))
         return as_planned(replace(begun, findings=tuple(map(self._in_time, findings))), slack)
 
@@ -386,13 +385,11 @@ class _Collectors:
         self._of_robots: dict[int, tuple[Robot, Collector]] = {}
 
     def of(self, robot: Robot) -> Collector:
-        """Return the collector of moves with the limits of a robot."""
         if not self.together:
             return self._all
         return self._of_robots.setdefault(id(robot), (robot, Collector(by_move=False)))[1]
 
     def findings(self) -> Iterator[Finding]:
-        """Yield what was found."""
         for collector in (self._all, *(one for _, one in self._of_robots.values())):
             yield from collector.findings()
 

@@ -74,7 +74,6 @@ class _Cursor:
         self.order, self.message, self.at = "<" if message[1] else ">", message, 4
 
     def number(self, kind: str, size: int) -> int:
-        """Return an integer."""
         self.align(size)
         self.need(size)
         (value,) = struct.unpack_from(self.order + kind, self.message, self.at)
@@ -89,7 +88,6 @@ class _Cursor:
             raise DamagedMessageError(f"it ends after {len(self.message)} bytes")
 
     def text(self) -> str:
-        """Return a string."""
         size = self.number("I", 4)
         self.need(size)
         data = self.message[self.at : self.at + size]
@@ -97,7 +95,6 @@ class _Cursor:
         return data.rstrip(b"\0").decode("utf-8", "replace")
 
     def texts(self) -> tuple[str, ...]:
-        """Return a sequence of strings."""
         count = self.number("I", 4)
         self.need(4 * count)
         return tuple(self.text() for _ in range(count))
@@ -117,7 +114,6 @@ class _Cursor:
         return self.number("i", 4) * 1_000_000_000 + self.number("I", 4)
 
     def values(self) -> Array:
-        """Return a sequence of float64."""
         start, count = self.sequence()
         return np.frombuffer(self.message, self.order + "f8", count, start).astype(np.float64)
 

@@ -245,7 +245,6 @@ class LogRecords:
         return block
 
     def _unpacked(self, chunk: Any) -> bytes:  # noqa: ANN401
-        """Return the records of a chunk."""
         if chunk.uncompressed_size > LONGEST_RECORD:
             raise self.wrong(f"a chunk claims {chunk.uncompressed_size} bytes, more than {LONGEST_RECORD}")
         data = self._decompressed(chunk)

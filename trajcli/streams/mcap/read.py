@@ -223,7 +223,6 @@ def _channels(known: LogRecords, topic: str) -> set[int]:
 
 
 def _chosen(known: LogRecords, topic: str | None) -> str:
-    """Return the topic that is read."""
     every = {channel.topic: number for number, channel in known.channels.items()}
     fit = [name for name, number in every.items() if _type(known, number) in _READ]
     if topic is None:
@@ -254,7 +253,6 @@ def _decoded(
     topic: str,
     layout: _Layout,
 ) -> JointSeries:
-    """Return the states in messages of a topic in a block."""
     starts = offsets + HEAD
     lengths = block.heads(offsets)["length"].astype(np.int64) - (HEAD - records.RECORD_HEAD.size)
     try:
