@@ -38,7 +38,7 @@ class Cause:
 
 def causes_of(plan: Plan) -> tuple[Cause, ...]:
     """Return the causes of what a plan's verdict found, in the order in which they were found."""
-    from trajcli.job.unit_hints import unit_hint
+    from trajcli.planning.advice import unit_hint
 
     alike: dict[tuple[float | str | None, ...], list[int]] = {}
     units, findings = unit_hint(plan.loaded), plan.verdict.findings

@@ -474,7 +474,7 @@ def _errors_at(loaded: LoadedJob, place: Place) -> Iterator[None]:
 
 
 def _unit_hint(loaded: LoadedJob) -> str | None:
-    from trajcli.job.unit_hints import unit_hint
+    from trajcli.planning.advice import unit_hint
 
     return unit_hint(loaded)
 
