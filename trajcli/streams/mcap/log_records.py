@@ -214,10 +214,14 @@ class LogRecords:
             self._metadata_at.append(struct.unpack_from("<Q", content)[0])
         elif kind == records.STATISTICS:
             self.statistics = _parsed("Statistics", content)
-        elif kind == records.DATA_END and self.checked:
-            (claimed,) = struct.unpack_from("<I", content)
+        elif kind in (records.DATA_END, records.FOOTER) and self.checked:
+            what, (claimed,) = "data", struct.unpack("<I", content[-4:])
+            if kind == records.FOOTER:
+                what, head = "summary", records.RECORD_HEAD.pack(kind, len(content))
+                checksum = zlib.crc32(head + content[:-4], checksum)
+            self._checksum = 0  # that of the summary begins anew
             if claimed not in (0, checksum):
-                raise self.wrong("the checksum of the data is wrong")
+                raise self.wrong(f"the checksum of the {what} is wrong")
 
     def _index(self, content: bytes) -> tuple[int, NDArray[np.int64]]:
         number, length = struct.unpack_from("<HI", content)

@@ -80,9 +80,9 @@ class _StatesReadBack:
             self._note(block)
         names = ("nanoseconds", "position", "velocity", "effort")
         whole = [np.concatenate([getattr(part, name) for part in parts]) for name in names]
-        rest = {name: values[count:] for name, values in zip(names, whole, strict=True)}
-        none = rest["position"][:, :0]
-        self._left[topic] = [JointSeries(parts[0].names, **rest, acceleration=none)]
+        others = {name: values[count:] for name, values in zip(names, whole, strict=True)}
+        none = others["position"][:, :0]
+        self._left[topic] = [JointSeries(parts[0].names, **others, acceleration=none)]
         return tuple(values[:count] for values in whole)
 
     def _note(self, block: MessageBlock) -> None:
