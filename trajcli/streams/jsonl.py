@@ -148,8 +148,8 @@ class JsonRows:
             if found:
                 self._columns[key] = _length(content)
         self._width = len(names)
-        rest = [key for key in value if key not in self._columns]
-        self.notes: tuple[str, ...] = (f"keys that are not read: {', '.join(rest)}",) if rest else ()
+        unread = [key for key in value if key not in self._columns]
+        self.notes: tuple[str, ...] = (f"keys that are not read: {', '.join(unread)}",) if unread else ()
         place = Place(file, first, 1, line[:_SHOWN].decode("utf-8", "replace").rstrip())
         self.named = NamedFile(file, tuple(names), lambda name: place)
         self.relative = np.zeros(self._width)
@@ -171,8 +171,8 @@ class JsonRows:
     def _block(self, rows: list[list[float]], taken: Sequence[int]) -> Array:
         if self._decimals.max(initial=0) < FULL_DECIMALS:
             columns = zip(*rows, strict=True)
-            most = [max(decimals_of(repr(value).encode()) for value in column) for column in columns]
-            self._decimals = np.maximum(self._decimals, most)
+            decimals = [max(decimals_of(repr(value).encode()) for value in column) for column in columns]
+            self._decimals = np.maximum(self._decimals, decimals)
         return np.array(rows, dtype=np.float64)[:, list(taken)]
 
     def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
@@ -226,8 +226,8 @@ def _length(content: Any) -> int | None:  # noqa: ANN401
 def _names_of(key: str, content: Any, file: str) -> list[str]:  # noqa: ANN401
     """Return the names of the columns of a key; none where it holds no numbers and no known name."""
     if not isinstance(content, list):
-        known = read_name(key).quantity is not None
-        return [key] if type(content) in (int, float) or known else []
+        named = read_name(key).quantity is not None
+        return [key] if type(content) in (int, float) or named else []
     count, kinds = len(content), kinds_of(key)
     if key in JOINT_ORDERS or read_name(f"{key}1").joint == 1:
         return [f"{key}{joint + 1}" for joint in range(count)]

@@ -104,9 +104,9 @@ def _head(joint_names: Sequence[str], message: RosMessage) -> Iterator[str]:
 def _points(knots: Knots, rows: slice, indent: str, orders: int) -> Iterator[str]:
     states = (knots.position[rows], knots.velocity[rows], knots.acceleration[rows])[:orders]
     for time, *values in zip(knots.nanoseconds[rows].tolist(), *states, strict=True):
-        seconds, rest = divmod(time, _BILLION)
+        seconds, nanoseconds = divmod(time, _BILLION)
         said = ", ".join(f"{key}: {_list(each)}" for key, each in zip(_KEYS, values, strict=False))
-        yield f"{indent}- {{{said}, time_from_start: {{sec: {seconds}, nanosec: {rest}}}}}\n"
+        yield f"{indent}- {{{said}, time_from_start: {{sec: {seconds}, nanosec: {nanoseconds}}}}}\n"
 
 
 def _list(values: Array) -> str:
