@@ -130,11 +130,11 @@ def test_a_field_of_another_type_or_format_is_refused(pick_log, tmp_path):
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
     monkeypatch.setattr("trajcli.streams.recorded_motion._KEPT", 0)
     peaks = []
-    for count in (600, 2400):
+    for count in (1200, 9600):
         log(tmp_path / f"{count}.mcap", count)
         tracemalloc.start()
         found = open_motion(tmp_path / f"{count}.mcap", field="reference")
         assert sum(len(block.t) for block in found.blocks(300)) == count
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    assert peaks[1] < 1.6 * peaks[0]  # of four times as many
+    assert peaks[1] < 2.0 * peaks[0]  # of eight times as many; what the collector has not yet taken counts, too
