@@ -140,11 +140,13 @@ def test_every_format_that_has_efforts_is_converted_with_them(
 ) -> None:
     write_plan(plan, str(tmp_path / "plan.jsonl"))
     motion = read_motion(str(tmp_path / "plan.jsonl"), ReadingOptions())
-    assert write_motion(motion, str(tmp_path / f"other.{ending}")) == ()
+    without_moves = "the column move is left out: the format is written without it"
+    lost = write_motion(motion, str(tmp_path / f"other.{ending}"))
+    assert lost == ((without_moves,) if ending == "mcap" else ())
     found = read_motion(str(tmp_path / f"other.{ending}"), ReadingOptions()).rows.tau
     assert np.array_equal(np.asarray(found), rows_of(plan)[:, 7:9])
-    (lost,) = write_motion(motion, str(tmp_path / "goal.yaml"))
-    assert lost == "the columns tau are left out: the format is written without them"
+    lost = write_motion(motion, str(tmp_path / "goal.yaml"))
+    assert {*lost} == {"the columns tau are left out: the format is written without them", without_moves}
 
 
 def test_a_log_has_efforts_only_where_they_are_asked_for(tmp_path: Path) -> None:
