@@ -40,7 +40,7 @@ def planned(
 def least_slack(plan: Any, length: float, stated: int, piece: int = 0) -> float:
     """Return from which slack on a piece counts as kept."""
     low, high = 1e-30, 1e30
-    for _ in range(110):
+    for _ in range(48):  # of 138 in the logarithm
         middle = float(np.sqrt(low * high))
         if pieces_within(plan, length, stated, middle)[piece]:
             high = middle

@@ -65,7 +65,7 @@ def test_the_slowest_joint_of_each_segment_counts_at_its_velocity_in_its_directi
 def test_no_motion_of_one_joint_from_state_to_state_is_below_it() -> None:
     """Ruckig's own, with accelerations at both ends that may be at their limits, and limits that differ by direction."""
     tried = 0
-    for seed in few(range(60), 20):
+    for seed in few(range(60), 16):
         rng = np.random.default_rng(seed)
         acceleration, velocity = (np.array([[-a, b]]) for a, b in rng.uniform(1, 4, (2, 2)))
         jerk, toward = float(rng.uniform(3, 30)), rng.choice([-1.0, 1.0])
@@ -79,7 +79,7 @@ def test_no_motion_of_one_joint_from_state_to_state_is_below_it() -> None:
             found = duration_through(np.array([[0.0], [distance]]), start, end, given)
             assert 0.0 < found.duration <= alone.duration * (1 + 1e-9), seed
             tried += 1
-    assert tried >= 12
+    assert tried >= 10
 
 
 def test_limits_that_the_peers_own_motions_break_are_those_of_their_joint(
