@@ -169,26 +169,36 @@ output: {rate: 50, columns: [t, q, qd, qdd, move]}
 """
 
 
-def test_between_rows_of_two_moves_the_tool_has_left_its_path(tmp_path: Path) -> None:
-    """The last row of a line and the first of the next move are joined by a piece that is not the line's alone."""
+def excess_where_plan_and_check_agree(text: str, folder: Path) -> tuple[Plan, dict[tuple, float]]:
+    """Return the plan of a job, and by kind, joint and move what its joined rows pass, as both say it."""
     from trajcli.judge.file import CheckOptions, check_file
 
-    plan, file = plan_job(job_from_text(LIFT)), tmp_path / "rows.csv"
-    trajcli.plan(LIFT).save(file)
+    plan, file = plan_job(job_from_text(text)), folder / "rows.csv"
+    trajcli.plan(text).save(file)
     own = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement()
     read = check_file(str(file), CheckOptions(), plan).judgement
     assert own is not None
     excess = [{(f.kind, f.joint, f.move): f.excess for f in found.findings} for found in (own, read)]
     assert excess[0] == pytest.approx(excess[1], rel=1e-4)
-    assert {kind for kind, _, _ in excess[1]} == {"acceleration", "jerk"}
-    # what leaves the line before its end is found
-    early = replace(
-        plan.moves[0].planned, tool=replace(plan.moves[0].planned.tool, tolerance=Tolerance(1e-9, 1e-9))
-    )
-    strict = replace(plan, moves=(replace(plan.moves[0], planned=early), *plan.moves[1:]))
-    found = joined_rows(strict, grid_of(plan), FORMATS["csv"]).judgement()
+    return plan, excess[1]
+
+
+def is_left(plan: Plan, index: int) -> bool:
+    """Return whether the tool leaves the path of a move as soon as nothing of that is tolerated."""
+    moves = list(plan.moves)
+    planned = moves[index].planned
+    strict = replace(planned, tool=replace(planned.tool, tolerance=Tolerance(1e-9, 1e-9)))
+    moves[index] = replace(moves[index], planned=strict)
+    found = joined_rows(replace(plan, moves=tuple(moves)), grid_of(plan), FORMATS["csv"]).judgement()
     assert found is not None
-    assert ("deviation", 0) in {(f.kind, f.move) for f in found.findings}
+    return ("deviation", index) in {(f.kind, f.move) for f in found.findings}
+
+
+def test_between_rows_of_two_moves_the_tool_has_left_its_path(tmp_path: Path) -> None:
+    """The last row of a line and the first of the next move are joined by a piece that is not the line's alone."""
+    plan, excess = excess_where_plan_and_check_agree(LIFT, tmp_path)
+    assert {kind for kind, _, _ in excess} == {"acceleration", "jerk"}
+    assert is_left(plan, 0)
 
 
 LATER = LIFT.replace("start: {joints: [0, -90,", "start: {joints: [30, -90,").replace(
@@ -198,21 +208,7 @@ LATER = LIFT.replace("start: {joints: [0, -90,", "start: {joints: [30, -90,").re
 
 def test_a_line_behind_another_move_is_followed_from_its_own_start_on(tmp_path: Path) -> None:
     """Nothing leaves it, though it begins after a second."""
-    from trajcli.judge.file import CheckOptions, check_file
-
-    plan, file = plan_job(job_from_text(LATER)), tmp_path / "rows.csv"
-    trajcli.plan(LATER).save(file)
-    own = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement()
-    read = check_file(str(file), CheckOptions(), plan).judgement
-    assert own is not None
-    excess = [{(f.kind, f.joint, f.move): f.excess for f in found.findings} for found in (own, read)]
-    assert excess[0] == pytest.approx(excess[1], rel=1e-4)
-    assert {move for kind, _, move in excess[1] if kind == "jerk"} >= {1, 2}
-    assert "deviation" not in {kind for kind, _, _ in excess[1]}
-    line = replace(
-        plan.moves[1].planned, tool=replace(plan.moves[1].planned.tool, tolerance=Tolerance(1e-9, 1e-9))
-    )
-    strict = replace(plan, moves=(plan.moves[0], replace(plan.moves[1], planned=line), *plan.moves[2:]))
-    found = joined_rows(strict, grid_of(plan), FORMATS["csv"]).judgement()
-    assert found is not None
-    assert ("deviation", 1) in {(f.kind, f.move) for f in found.findings}
+    plan, excess = excess_where_plan_and_check_agree(LATER, tmp_path)
+    assert {move for kind, _, move in excess if kind == "jerk"} >= {1, 2}
+    assert "deviation" not in {kind for kind, _, _ in excess}
+    assert is_left(plan, 1)

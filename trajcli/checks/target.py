@@ -75,14 +75,28 @@ def _check_pins(
 
 
 def _beside(trajectory: Trajectory, span: Span, joint: int, value: float, limit: float) -> Finding:
+    message = f"{{joint}} ends {{value}} beside its target {at_time(span.end)}"
+    return _of_joint(trajectory, span, joint, "target", (value, limit, span.end), message)
+
+
+def _of_joint(
+    trajectory: Trajectory,
+    span: Span,
+    joint: int,
+    kind: Literal["target", "waypoint"],
+    found: tuple[float, float, float],
+    message: str,
+) -> Finding:
+    """Return the finding about one joint, by its value, the limit and the time."""
+    value, limit, time = found
     return Finding(
         move=span.index,
         joint=trajectory.joint_names[joint],
-        kind="target",
+        kind=kind,
         value=value,
         limit=limit,
-        time=span.end,
-        message=f"{{joint}} ends {{value}} beside its target {at_time(span.end)}",
+        time=time,
+        message=message,
         amounts=joint_amounts(trajectory, joint, 0, value=value, limit=limit),
     )
 
@@ -171,17 +185,10 @@ def _furthest(trajectory: Trajectory, span: Span, points: ViaPoints) -> Iterator
             found = [float(each) for each in (over[k, joint], times[k], distance[k, joint], missed[k, joint])]
             worst[joint] = max(worst.get(joint, found), found, key=itemgetter(0))
     for joint, (_, time, value, limit) in sorted(worst.items()):
-        passes = f"the path of {{joint}} passes a waypoint at {{value}} {at_time(time)}"
-        yield Finding(
-            move=span.index,
-            joint=trajectory.joint_names[joint],
-            kind="waypoint",
-            value=value,
-            limit=limit,
-            time=time,
-            message=f"{passes}, it shall be {{limit}}",
-            amounts=joint_amounts(trajectory, joint, 0, value=value, limit=limit),
+        message = (
+            f"the path of {{joint}} passes a waypoint at {{value}} {at_time(time)}, it shall be {{limit}}"
         )
+        yield _of_joint(trajectory, span, joint, "waypoint", (value, limit, time), message)
 
 
 def _distances(trajectory: Trajectory, span: Span, times: Array, points: Array) -> Array:

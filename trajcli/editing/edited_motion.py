@@ -210,6 +210,6 @@ def _whole(file: MotionFile) -> EditedMotion:
             f"{file.source}: the time stamp of row {row} is {after:.9g} s, that before it {before:.9g} s",
             hint="stamps must increase; `trajcli check` lists all that is wrong with the stamps",
         )
-    lost = tuple(f"columns that are left out: {', '.join(names)}" for names in (file.unread,) if names)
+    lost = (f"columns that are left out: {', '.join(file.unread)}",) if file.unread else ()
     others = (note for note in file.notes if note not in note_of_unread(file.unread))
     return EditedMotion(rows, file.written_columns(), file.format, (*lost, *others))

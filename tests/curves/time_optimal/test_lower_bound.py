@@ -113,9 +113,6 @@ class BySide(SpeedCap):
         self.before, self.behind = before, behind
         super().__init__(None)
 
-    def rows(self, s, side):
-        raise NotImplementedError
-
     def largest(self, s, side):
         behind = (s >= 1.0) if side == "right" else (s > 1.0)
         return np.where(behind, self.behind, self.before) ** 2
