@@ -291,9 +291,8 @@ def _backward(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str | 
     turned = rows.kept[::-1] * signs
     turned[:, rows.time] = stamps.last[1] - rows.kept[::-1, rows.time]
     moves = [k for k, column in enumerate(rows.columns) if column.kind == "move"]
-    edited = (
-        turned.copy()
-    )  # as `reverse` writes it: a row is of the move that follows, on the way back as well
+    # as `reverse` writes it: a row is of the move that follows, on the way back as well
+    edited = turned.copy()
     edited[:, moves] = np.concatenate([rows.kept[-2::-1, moves], rows.kept[:1, moves]])
     grid = ListedGrid(duration, np.clip(turned[:, rows.time], 0.0, duration))
     for back in (turned, edited) if moves else (turned,):
