@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,11 @@ from trajcli.editing.requirements import kept_limits
 from trajcli.editing.retiming import Stretch, retime
 from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
+from trajcli.job.read import job_from_text
 from trajcli.judge.file import CheckOptions, check_file
+from trajcli.output.write import write_plan
+from trajcli.planning.plan import plan_job
+from trajcli.streams.decimals import Digits
 from trajcli.streams.recorded_motion import open_motion
 
 PEAKS = (15 / 8, 10 / 3**0.5, 60.0)
@@ -183,6 +188,25 @@ def of_moves(tmp_path: Path, *, fastest: bool, limits: str = "") -> tuple[Array,
     return table(tmp_path / "out.csv")[1], stretches
 
 
+def test_what_joins_rows_where_the_law_changes_makes_no_factor_larger(tmp_path: Path) -> None:
+    """A trapezoid there and back at 20 of 90 deg/s^2; what joins its rows passes 20 by a factor of 1.37."""
+    job = """\
+version: 1
+units: {angle: deg}
+robot: {joints: [{velocity: 1000, acceleration: 90}]}
+start: {joints: [0]}
+moves:
+  - {planner: trapezoid, to: {joints: [50]}, velocity: 20, acceleration: 20}
+  - {planner: trapezoid, to: {joints: [0]}, velocity: 20, acceleration: 20}
+output: {rate: 100, columns: [t, q, qd, qdd, move]}
+"""
+    (tmp_path / "job.yaml").write_text(job)
+    kept = kept_limits(str(tmp_path / "job.yaml"), None)
+    motion = read_motion(str(planned(tmp_path / "rows.csv", job)), ReadingOptions())
+    _, stretches = retime(motion, kept.requirements, fastest=True, per_move=True)
+    assert [stretch.factor for stretch in stretches] == pytest.approx([sqrt(20 / 90)] * 2, rel=2e-4)
+
+
 @pytest.mark.parametrize("fastest", [False, True])
 def test_each_move_by_its_own_factor(fastest: bool, tmp_path: Path) -> None:
     rows, stretches = of_moves(tmp_path, fastest=fastest)
@@ -195,6 +219,30 @@ def test_each_move_by_its_own_factor(fastest: bool, tmp_path: Path) -> None:
     np.testing.assert_allclose(rows[:100, 3:5], before[:100, 3:5] / factors[0], atol=1e-7)
     np.testing.assert_allclose(rows[100:, 3:5], before[100:, 3:5] / factors[1], atol=1e-7)
     np.testing.assert_array_equal(rows[:, -1], before[:, -1])
+
+
+@pytest.mark.parametrize("digits", ["fixed", "full"])
+def test_a_hold_keeps_its_time_between_moves_that_become_faster(digits: Digits, tmp_path: Path) -> None:
+    """A quintic over 50 deg in T reaches 15/8 50/T deg/s: within 60 it takes 1.5625 s."""
+    job = """\
+version: 1
+units: {angle: deg}
+robot: {joints: [{velocity: 60}]}
+start: {joints: [0]}
+moves:
+  - {planner: quintic, to: {joints: [50]}, duration: 3}
+  - {planner: hold, duration: 0.4}
+  - {planner: quintic, to: {joints: [0]}, duration: 4}
+output: {rate: 50, columns: [t, q, qd, qdd, move]}
+"""
+    (tmp_path / "job.yaml").write_text(job)
+    write_plan(plan_job(job_from_text(job)), str(tmp_path / "rows.csv"), digits=digits)
+    kept = kept_limits(str(tmp_path / "job.yaml"), None)
+    motion = read_motion(str(tmp_path / "rows.csv"), ReadingOptions())
+    found, stretches = retime(motion, kept.requirements, fastest=True, per_move=True)
+    assert [stretch.factor for stretch in stretches] == pytest.approx([1.5625 / 3, 1, 1.5625 / 4], rel=2e-4)
+    held = found.rows.t[found.rows.move == 1]
+    assert held[-1] - held[0] == pytest.approx(0.4 - 1 / 50)
 
 
 def test_moves_that_meet_in_motion_share_a_factor(tmp_path: Path) -> None:

@@ -73,7 +73,8 @@ def retime(
         motion: What is retimed.
         requirements: Its limits.
         fastest: Whether it may also become faster; else it keeps its time where it keeps its limits.
-        per_move: Whether each move has a factor of its own; moves that meet in motion share one.
+        per_move: Whether each move has a factor of its own; moves that meet in motion share one, and one
+            that stands still keeps its time.
         as_read: Returns a motion as a reader of what is written of it finds it.
 
     Raises:
@@ -87,7 +88,9 @@ def retime(
     ranges = _ranges(motion) if per_move else [(slice(0, motion.rows.t.size), None)]
     stretches = []
     for rows, moves in ranges:
-        factor, binding = _smallest(_part(motion.rows, rows), judge, strictly, fastest=fastest)
+        part = _part(motion.rows, rows)
+        hurried = fastest and (moves is None or _travels(part))
+        factor, binding = _smallest(part, judge, strictly, fastest=hurried)
         stretches.append(Stretch(factor, moves, binding))
     return _verified(motion, [rows for rows, _ in ranges], stretches, judge, as_read)
 
@@ -145,6 +148,11 @@ def _part(rows: RecordedMotion, part: slice) -> RecordedMotion:
         name: None if (found := getattr(rows, name)) is None else found[part] for name in names
     }
     return replace(rows, t=rows.t[part], **values)
+
+
+def _travels(rows: RecordedMotion) -> bool:
+    """Return whether a joint moves in some rows; those of a hold stand still, and no limit times them."""
+    return bool((np.ptp(rows.q, axis=0) > 2 * rows.resolution.q).any())
 
 
 def _smallest(

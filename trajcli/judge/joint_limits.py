@@ -88,7 +88,7 @@ class JudgedRun:
         """
         groups: tuple[tuple[NDArray[np.bool_], FindingSeverity, Certainty], ...] = (
             (certain & ~warned, "error", "exceeded"),
-            (~certain, "error", "within rounding"),
+            (~certain & ~warned, "error", "within rounding"),
             (certain & warned, "warning", "exceeded"),
         )
         for chosen, severity, certainty in groups:
@@ -192,8 +192,10 @@ class _Side:
         by_curve = found.value - found.bound > error
         value = np.where(by_rows & ~by_curve, np.minimum(stated, found.value), found.value)
         certain, warned = by_rows | by_curve, np.zeros(value.shape, dtype=bool)
-        if not run.asked and by_curve.any():
-            warned = by_curve & ~by_rows & self._unresolved(found, error)
+        if not run.asked:
+            silent = ~exceeds(stated, found.bound)  # a little beyond between rows is no worse than far beyond
+            slack = np.where(by_curve, error, np.where(silent, 0.0, -np.inf))
+            warned = ~by_rows & self._unresolved(found, slack)
         excess = value / found.bound if self.order else value - found.bound
 
         def make(k: int) -> Finding:
@@ -204,10 +206,10 @@ class _Side:
         found_at = found.piece, found.joint
         run.add(JOINT_KINDS[self.order].name, found_at, excess, make, certain, warned)
 
-    def _unresolved(self, found: _Offences, error: Array) -> NDArray[np.bool_]:
+    def _unresolved(self, found: _Offences, slack: Array) -> NDArray[np.bool_]:
         """Return where a change of the law between two rows explains what the curve goes beyond the bound."""
         explained = explained_by_law(self.window, found.piece, found.joint, self.order, self.level)
-        return np.asarray(found.value - found.bound <= explained + error)
+        return np.asarray(found.value - found.bound <= explained + slack)
 
     def _finding(
         self, found: _Offences, k: int, value: float, error: float, robot: Robot, *, warned: bool
