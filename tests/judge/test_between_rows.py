@@ -129,12 +129,12 @@ def test_a_little_beyond_a_limit_between_rows_is_no_worse_than_far_beyond(side: 
     rate, t = 20.0, 0.01 * np.arange(200)
     late = np.maximum(t - 1.0, 0.0)
     q, qd, qdd = rate * (t**2 - late**2) / 2, rate * (t - late), np.where(t < 1.0, rate, 0.0)
-    half = np.array([0.5e-9])
     motion = motion_of(*(side * each[:, None] for each in (q, qd, qdd)), t=t)
-    motion = replace(motion, resolution=Resolution(0.0, half, half, half))
 
-    def found(limit: float) -> list[Finding]:
-        return over(motion, bare_robot(bounded(2, side, limit)))
+    def found(limit: float, off: float = 0.5e-9) -> list[Finding]:
+        half = np.array([off])
+        rows = replace(motion, resolution=Resolution(0.0, half, half, half))
+        return over(rows, bare_robot(bounded(2, side, limit)))
 
     (far,) = found(1.01 * rate)
     assert far.severity == "warning"
@@ -143,6 +143,8 @@ def test_a_little_beyond_a_limit_between_rows_is_no_worse_than_far_beyond(side: 
         assert {each.severity for each in found((1 - share) * abs(far.value))} <= {"warning"}, share
     (stated,) = [each for each in found((1 - 1e-8) * rate) if each.severity == "error"]
     assert (stated.certainty, stated.count) == ("exceeded", 100)
+    (stated,) = [each for each in found((1 - 1e-8) * rate, 0.5e-6) if each.severity == "error"]
+    assert (stated.certainty, stated.count) == ("within rounding", 99)
 
 
 @pytest.mark.parametrize("side", SIDES)
