@@ -126,6 +126,23 @@ def test_rest_of_positions_alone_in_either_direction(side: float, reverse: bool,
         assert (f"fr3-rest-{'start' if reverse else 'end'}" in found) == broken
 
 
+@pytest.mark.parametrize(("row", "at"), [(0, "start"), (2, "start"), (-3, "end"), (-1, "end")])
+@pytest.mark.parametrize(("factor", "told"), [(1.0, True), (1.009, True), (2.0, False), (0.5, False)])
+def test_rest_of_positions_alone_is_judged_at_the_period_alone(
+    factor: float, row: int, at: str, *, told: bool
+) -> None:
+    """A joint that moves at 0.01 rad/s; one interval near the end is another one than the controller has."""
+    q, t = STILL.copy(), 1e-3 * np.arange(21.0)
+    q[:, 3] += 0.01 * t
+    before = max(row, 1) if row >= 0 else 21 + max(row, -2)
+    t[before:] += (factor - 1.0) * 1e-3
+    rows = replace(motion(rows=21, columns="q", decimals=None), t=t, q=q)
+    judgement = judged(rows, "franka-fr3", Surroundings(rows.joints, q[0]))
+    assert ({f"fr3-rest-{at}"} <= {each.rule for each in judgement.findings}) == told
+    unjudged = {} if told else {f"fr3-rest-{at}": "its rows there are not 0.001 s apart, as its consumer takes them"}
+    assert {name: why for name, why in judgement.unjudged if "rest" in name} == unjudged
+
+
 @SIDES
 def test_velocity_towards_either_end(side: float) -> None:
     """0.1 rad before an end joint 1 may move with sqrt(2 6 0.1) - 0.3 - 1e-3 rad/s, at the row before."""
@@ -198,6 +215,34 @@ def test_decimals_of_a_joint_say_nothing_of_another_that_is_too_fast(coarse: int
     (one,) = [each for each in found if each.rule == "fr3-velocity"]
     assert one.factor == (None if coarse == 3 else pytest.approx(1.01, rel=1e-6))
     assert ("decimals" in (one.hint or "")) == (coarse == 3)
+
+
+@SIDES
+@pytest.mark.parametrize(("relative", "decimals"), [(7.5e-6, True), (5.5e-6, False)])
+def test_numbers_of_few_bits_explain_what_is_too_fast_as_decimals_do(
+    relative: float, side: float, *, decimals: bool
+) -> None:
+    """A hundredth of 2.62 rad/s too fast: twice the error of positions near 2 rad over a millisecond, if that is 1.3e-5."""
+    coarse = replace(FRANKA.resolution, relative=(relative, 0.0, 0.0))
+    rows = replace(pushed(1.01, side, np.ones(20)), resolution=coarse)
+    found = judged(rows, "franka-fr3", Surroundings(rows.joints, rows.q[0])).findings
+    (one,) = [each for each in found if each.rule == "fr3-velocity"]
+    assert ("decimals" in (one.hint or ""), one.factor is None) == (decimals, decimals)
+
+
+@SIDES
+@pytest.mark.parametrize(("units", "broken"), [(1.1, False), (3.0, True)])
+def test_numbers_of_few_bits_may_be_off_where_the_motion_begins_and_ends(
+    units: float, side: float, *, broken: bool
+) -> None:
+    """Half a millionth of 2 rad; it is a motion where it is more than a second difference of rest and its rounding."""
+    coarse = replace(FRANKA.resolution, q=np.zeros(7), relative=(0.25e-6, 0.0, 0.0))
+    q = STILL.copy()
+    q[-1, 3] += side * units * 1e-6
+    rows = replace(motion(rows=21, columns="q"), q=q, resolution=coarse)
+    assert ("fr3-rest-end" in rules(rows, "franka-fr3")) == broken
+    stands = STILL[0] + np.eye(7)[3] * side * (1.55e-6 if broken else 1.45e-6)
+    assert ("fr3-start" in rules(rows, "franka-fr3", stands)) == broken
 
 
 def pushed(share: float, side: float, periods: np.ndarray) -> RecordedMotion:

@@ -13,12 +13,13 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.approach import ApproachLimits
 from trajcli.curves.piecewise import Array
 from trajcli.errors import at_least
-from trajcli.streams.recorded_motion import RecordedMotion
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 __all__ = ["Differences", "EffortRate", "RoundingNoise", "VelocityTowardsEnds"]
 
@@ -39,6 +40,21 @@ def rounding_noise(order: int, half_unit: Array, period: float) -> Array:
         period: s.
     """
     return np.asarray(2.0**order * half_unit / period**order)
+
+
+def largest_rounding(positions: Array, resolution: Resolution) -> Array:
+    """Return the largest error of some positions as a file writes them, by joint, shape (n,).
+
+    Args:
+        positions: Shape (N, n).
+        resolution: Of the file.
+    """
+    return np.asarray(resolution.q + resolution.relative[0] * np.abs(positions).max(axis=0))
+
+
+def at_period(times: Array, period: float) -> NDArray[np.bool_]:
+    """Return which intervals between neighbouring stamps are those of a controller, shape (N - 1,)."""
+    return np.asarray(np.abs(np.diff(times) - period) <= _NEAR * period)
 
 
 class _AtPeriod(RuleCheck):
@@ -71,11 +87,11 @@ class _AtPeriod(RuleCheck):
         """Judge the values of the block, before which stand the last ones of the block before."""
 
     def _count_intervals(self, rows: RecordedMotion) -> None:
-        period = self.number("period")
-        steps = np.diff(rows.t if self._stamp is None else np.append(self._stamp, rows.t))
+        times = rows.t if self._stamp is None else np.append(self._stamp, rows.t)
+        near = at_period(times, self.number("period"))
         self._stamp = float(rows.t[-1])
-        self._intervals += steps.size
-        self._at_period += int(np.count_nonzero(np.abs(steps - period) <= _NEAR * period))
+        self._intervals += near.size
+        self._at_period += int(np.count_nonzero(near))
 
     def _finish(self) -> None:
         if 2 * self._at_period < self._intervals:
@@ -100,10 +116,11 @@ class Differences(_AtPeriod):
         order = _ORDERS[name]
         limit = self.vector("limit", count) - self.number("margin")
         rates = (np.diff(values, order, axis=0) / period**order)[self._depth - order :]
-        noise = rounding_noise(order, rows.resolution.q, period)
 
         def fields(index: int, joint: int) -> dict[str, Any]:
             value, bound = float(rates[index, joint]), float(limit[joint])
+            compared = values[index + self._depth - order : index + self._depth + 1]
+            noise = rounding_noise(order, largest_rounding(compared, rows.resolution), period)
             rounded = abs(value) - noise[joint] <= bound
             unit = _UNIT[order]
             text = (
@@ -192,8 +209,7 @@ class RoundingNoise(RuleCheck):
         if not self.fits("limit", rows.q.shape[1]):
             return
         limit = self.vector("limit", rows.q.shape[1])
-        resolution = rows.resolution
-        half = resolution.q + resolution.relative[0] * np.abs(rows.q).max(axis=0)
+        half = largest_rounding(rows.q, rows.resolution)
         noise = rounding_noise(3, half, self.number("period"))
         used = noise / limit
         joint = int(used.argmax())
@@ -210,7 +226,9 @@ class RoundingNoise(RuleCheck):
             f"{float(limit[joint]):.6g} that {self.joint_name(rows, joint)} may have",
             "hint": "write positions in rad with at least nine decimals",
         }
-        self.note(rows, joint, 0, float(used[joint]), fields)
+        # of numbers of few bits the largest is the coarsest
+        roughest = int(np.abs(rows.q[:, joint]).argmax()) if rows.resolution.relative[0] else 0
+        self.note(rows, joint, roughest, float(used[joint]), fields)
 
 
 class EffortRate(_AtPeriod):

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from trajcli.consumers.differences import largest_rounding
 from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding
@@ -189,7 +190,7 @@ class FirstPoint(RuleCheck):
 
     def _jump(self, rows: RecordedMotion, start: Array) -> None:
         apart = rows.q[0] - start
-        tolerance = self.number("tolerance") + rows.resolution.q
+        tolerance = self.number("tolerance") + largest_rounding(rows.q[:1], rows.resolution)
 
         def fields(index: int, joint: int) -> dict[str, Any]:
             return {

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from trajcli.consumers.differences import rounding_noise
+from trajcli.consumers.differences import at_period, largest_rounding, rounding_noise
 from trajcli.consumers.rule_check import RuleCheck, when
 from trajcli.curves.piecewise import Array
 from trajcli.streams.recorded_motion import RecordedMotion
@@ -211,7 +211,8 @@ class AtRest(RuleCheck):
     """Rest `at` the start or the end: velocity and acceleration are zero.
 
     Of columns for these, up to `velocity` and `acceleration` and their rounding. Without them of differences
-    of the first or last positions, up to what one `period` at the limit of `jerk` leaves.
+    of the first or last positions, up to what one `period` at the limit of `jerk` leaves; not judged where
+    these stand further apart.
     """
 
     parameters: ClassVar[Mapping[str, Any]] = {
@@ -224,13 +225,15 @@ class AtRest(RuleCheck):
 
     _rows: RecordedMotion | None = None
     _near: Array | None = None
+    """Up to three rows, the stamp before the positions."""
 
     def _take(self, rows: RecordedMotion) -> None:
         if self.word("at") == "start":
-            before = rows.q[:0] if self._near is None else self._near
-            self._rows, self._near = self._rows or rows, np.concatenate([before, rows.q[: 3 - len(before)]])
+            before = np.empty((0, 1 + rows.q.shape[1])) if self._near is None else self._near
+            near = np.column_stack([rows.t, rows.q])[: 3 - len(before)]
+            self._rows, self._near = self._rows or rows, np.concatenate([before, near])
             return
-        near = rows.q[-3:]
+        near = np.column_stack([rows.t[-3:], rows.q[-3:]])
         if self._near is not None and len(near) < 3:
             near = np.concatenate([self._near, near])[-3:]
         self._rows, self._near = rows, near
@@ -280,9 +283,12 @@ class AtRest(RuleCheck):
                 continue
             if len(near) <= order:
                 continue
-            values = np.diff(near, order, axis=0) / period**order
+            if not at_period(near[:, 0], period).all():
+                self.unjudged = f"its rows there are not {period:g} s apart, as its consumer takes them"
+                return
+            values = np.diff(near[:, 1:], order, axis=0) / period**order
             # from rest, or to it: jerk h^2 / 6 and jerk h are what differences make of one period
             left = jerk * (period**2 / 6 if order == 1 else period)
-            noise = rounding_noise(order, resolution.q, period)
+            noise = rounding_noise(order, largest_rounding(near[:, 1:], resolution), period)
             first = values[0] if self.word("at") == "start" else values[-1]
             yield order, kind, first, left * (1 + _ROUNDING) + noise, "differences"
