@@ -139,7 +139,9 @@ def test_rest_of_positions_alone_is_judged_at_the_period_alone(
     rows = replace(motion(rows=21, columns="q", decimals=None), t=t, q=q)
     judgement = judged(rows, "franka-fr3", Surroundings(rows.joints, q[0]))
     assert ({f"fr3-rest-{at}"} <= {each.rule for each in judgement.findings}) == told
-    unjudged = {} if told else {f"fr3-rest-{at}": "its rows there are not 0.001 s apart, as its consumer takes them"}
+    unjudged = (
+        {} if told else {f"fr3-rest-{at}": "its rows there are not 0.001 s apart, as its consumer takes them"}
+    )
     assert {name: why for name, why in judgement.unjudged if "rest" in name} == unjudged
 
 

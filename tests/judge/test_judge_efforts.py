@@ -196,3 +196,59 @@ def test_a_joint_that_turns_slowly_has_the_friction_of_its_way_back(
     efforts = [each for each in found.findings if each.kind == "effort"]
     assert found.verdict == verdict
     assert [side * each.value for each in efforts] == pytest.approx([-2.65] if efforts else [], rel=1e-5)
+
+
+def swing(
+    folder: Path, t: np.ndarray, largest: float, columns: int, decimals: int, side: int
+) -> tuple[str, list[Finding]]:
+    """Return verdict and efforts of I = 0.33 kg m^2 that swings at 1 Hz, of which 2.5 N m are allowed on one side."""
+    allowed = [-1e4, 2.5] if side > 0 else [-2.5, 1e4]
+    (folder / "arm.yaml").write_text(
+        f"name: arm\nconvention: standard\njoints:\n  - {{a: 1, effort: {allowed}, "
+        "link: {mass: 1, com: [-0.5, 0, 0], inertia: [0.08, 0.08, 0.08, 0, 0, 0]}}\n"
+    )
+    w = 2 * np.pi
+    states = [-np.sin(w * t) / w**2, -np.cos(w * t) / w, np.sin(w * t)]
+    rows = np.column_stack([t, *(largest * values for values in states)])[:, : columns + 1]
+    names = ["t", "q1", "qd1", "qdd1"][: columns + 1]
+    np.savetxt(folder / "rows.csv", rows, f"%.{decimals}f", ",", header=",".join(names), comments="")
+    judged = check_file(str(folder / "rows.csv"), CheckOptions(robot=str(folder / "arm.yaml"))).judgement
+    return judged.verdict, [each for each in judged.findings if each.kind == "effort"]
+
+
+@pytest.mark.parametrize("decimals", [4, 6])
+@pytest.mark.parametrize("columns", [2, 3])
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("late", "over"), [(1e-4, True), (-1e-4, True), (1e-4, False)])
+def test_a_short_interval_hides_no_torque_elsewhere_and_is_none_itself(
+    late: float, side: int, columns: int, decimals: int, tmp_path: Path, *, over: bool
+) -> None:
+    """Of decimals 0.1 ms make hundreds of N m; 0.33 times 9 rad/s^2 are over 2.5, and certainly so between other rows."""
+    t = np.sort(np.append(np.arange(21) * 0.05, 0.5 + late))
+    verdict, found = swing(tmp_path, t, 9.0 if over else 6.0, columns, decimals, side)
+    assert verdict == ("exceeded" if over else "satisfied")
+    assert {each.certainty for each in found} <= {"exceeded" if over else "within rounding"}
+    for each in found if over else ():
+        assert each.value == pytest.approx(side * 0.33 * 9.0, rel=0.03)
+        assert each.factor == pytest.approx((0.33 * 9.0 / 2.5) ** 0.5, rel=0.02)
+        assert each.time == pytest.approx(0.5 - 0.25 * side, abs=0.03)
+
+
+@pytest.mark.parametrize("decimals", [4, 6])
+@pytest.mark.parametrize("columns", [2, 3])
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("largest", "over"), [(7.8, True), (7.4, False)])
+def test_what_dense_rows_state_is_over_a_limit_whatever_their_decimals_make_of_the_curve(
+    largest: float, side: int, columns: int, decimals: int, tmp_path: Path, *, over: bool
+) -> None:
+    """0.33 times 7.6 rad/s^2 are 2.5 N m; the curve through four decimals has 200 N m."""
+    verdict, found = swing(tmp_path, np.arange(251) * 4e-3, largest, columns, decimals, side)
+    assert verdict == ("exceeded" if over else "satisfied")
+    certain = [each for each in found if (each.certainty, each.severity) == ("exceeded", "error")]
+    assert len(certain) == over
+    for each in certain:
+        assert each.value == pytest.approx(side * 0.33 * largest, rel=0.02 if decimals == 4 else 0.05)
+        assert each.factor == pytest.approx((abs(each.value) / 2.5) ** 0.5, rel=1e-5)
+        assert each.row == round(each.time / 4e-3 - 0.01) + 1
+        assert each.time == pytest.approx(0.5 - 0.25 * side, abs=0.03)
+        assert each.method == ("sampled" if decimals == 4 else each.method)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +19,12 @@ from trajcli.curves.extrema import critical_points
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.findings import Certainty, Collector, Finding, FindingSeverity
 from trajcli.frozen import frozen
-from trajcli.judge.intervals import DENSE, Intervals, explained_by_law
+from trajcli.judge.intervals import Intervals, explained_by_law
 from trajcli.judge.rounding import PieceRows
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.joints import joint_excess
-from trajcli.limits.kinds import JOINT_KINDS, families
-from trajcli.limits.tolerances import EFFORT_RELATIVE, exceeds
-
-if TYPE_CHECKING:
-    from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey
-    from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.limits.kinds import JOINT_KINDS, KIND_OF
+from trajcli.limits.tolerances import exceeds
 
 _MANY = 20000  # pieces and joints over a limit from which on only the worst of them are looked at closely
 
@@ -73,6 +68,11 @@ class JudgedRun:
     asked: bool
     carries_one: bool = True
 
+    @property
+    def limits_efforts(self) -> bool:
+        """Whether torques or forces are limited, and it is known what the tool carries."""
+        return self.carries_one and KIND_OF["effort"].stated(self.robot.limits)
+
     def add(
         self,
         kind: str,
@@ -105,17 +105,10 @@ class JudgedRun:
 
 
 def judge_limits(run: JudgedRun) -> None:
-    """Add where joints go beyond their limits in pieces with the same limits.
-
-    Raises:
-        InputError: When efforts are limited, and a link of the arm has no inertia, or the arm no geometry.
-    """
+    """Add where joints go beyond their limits in pieces with the same limits."""
     _judge_derivatives(run)
-    for name, _ in families(run.robot.limits, further=True):
-        if name == "velocity_by_position":
-            _judge_approaches(run)
-        elif name == "effort" and run.carries_one:
-            _judge_efforts(run)
+    if KIND_OF["velocity_by_position"].stated(run.robot.limits):
+        _judge_approaches(run)
 
 
 def _judge_derivatives(run: JudgedRun) -> None:
@@ -340,110 +333,3 @@ def _fast_approaches(
     sign = np.where(upwards, 1.0, -1.0)
     rounding = rows.error(1) + np.maximum(roomy - bound, 0.0)
     return _FastApproaches(piece, joint, local, distance, speed, sign * bound, rounding, used)
-
-
-_STILL = 1e-9  # rad/s or m/s: rest, as files of nine decimals tell it
-_UNKNOWN = 1e9  # SI: of a rate that rounding hides
-_ACCELERATED = 3  # degree from which on pieces have an acceleration
-
-
-def _judge_efforts(run: JudgedRun) -> None:
-    """Add where joints of an arm are over their limits of torque or force.
-
-    Rows state efforts where they have accelerations, and the mean of one between two velocities else. Where
-    rows stand dense, an effort that only the curve between them has is a warning, as above.
-    """
-    from trajcli.dynamics.effort_bound import effort_survey
-    from trajcli.dynamics.newton_euler import InverseDynamics
-
-    window, limits = run.window, run.robot.limits.effort
-    curved = np.flatnonzero(window.highest[run.pieces] >= _ACCELERATED - 1) + run.pieces.start
-    if not curved.size:
-        return
-    dynamics, coefficients = InverseDynamics(run.robot), window.coefficients[:, curved]
-    breaks = np.concatenate([[0.0], np.cumsum(window.lengths[curved])])
-    survey = effort_survey(dynamics, breaks, coefficients, limits, _still(window))
-    stated = _stated_efforts(dynamics, window, curved)
-    for joint, bounds in enumerate(limits.tolist()):
-        for sign, limit in ((1, bounds[1]), (-1, -bounds[0])):
-            peak = survey.peak(joint, sign)
-            if not peak.upper_bound <= limit * (1 + EFFORT_RELATIVE):
-                over = _OverEffort(run, dynamics, survey, curved, breaks, joint, sign, limit, peak)
-                over.add(float((sign * stated[:, joint]).max()))
-
-
-def _still(window: Intervals) -> float:
-    """Return how fast a joint at rest may seem by the rounding of rows, rad/s or m/s."""
-    return max(_STILL, 2 * float(np.max(window.resolution.qd)))
-
-
-def _stated_efforts(dynamics: InverseDynamics, window: Intervals, curved: NDArray[np.intp]) -> Array:
-    """Return the efforts that rows state, or the mean accelerations between them, shape (m, n).
-
-    At rest friction is that of the motion beside.
-    """
-    q, qd, qdd = window.states
-    middle = window.lengths[curved, None] / 2
-    chosen = window.coefficients[:, curved]
-    here, rate = (horner(derivative_coefficients(chosen, order), middle) for order in (0, 1))
-    if qdd is not None and qd is not None and q is not None:
-        ends = np.concatenate([curved, curved + 1])
-        rates, still = qd[ends], _still(window)
-        beside = still * np.sign(np.concatenate([rate, rate]))
-        return dynamics.effort(q[ends], np.where(np.abs(rates) <= still, beside, rates), qdd[ends])
-    first = derivative_coefficients(chosen, 1)
-    change = (horner(first, 2 * middle) - first[-1]) / (2 * middle)
-    return dynamics.effort(here, rate, change)
-
-
-@frozen
-class _OverEffort:
-    """A joint over its limit in one direction, on the pieces `curved` of a window."""
-
-    run: JudgedRun
-    dynamics: InverseDynamics
-    survey: EffortSurvey
-    curved: NDArray[np.intp]
-    breaks: Array
-    joint: int
-    sign: int
-    limit: float
-    peak: EffortPeak
-
-    def add(self, stated: float) -> None:
-        """Add it by what is certain about it; rows state `stated` at most."""
-        run, peak = self.run, self.peak
-        at = int(np.clip(np.searchsorted(self.breaks, peak.time, "right") - 1, 0, self.curved.size - 1))
-        piece, local = int(self.curved[at]), float(peak.time - self.breaks[at])
-        rounding = self._rounding(piece, local)
-        dense = float(run.window.lengths[piece]) <= DENSE
-        warned = not run.asked and dense and stated <= self.limit * (1 + EFFORT_RELATIVE) + rounding
-        found = self._finding(piece, local, rounding)
-        run.worst.add(
-            "effort",
-            int(run.window.moves[piece]),
-            np.array([self.joint]),
-            np.array([peak.upper_bound / self.limit]),
-            lambda _: found,
-            severity="warning" if warned else "error",
-            certainty="exceeded" if peak.upper_bound - self.limit > rounding else "within rounding",
-        )
-
-    def _rounding(self, piece: int, local: float) -> float:
-        """Return by how much the effort may be off by the rounding of each number of the rows."""
-        window, joints = self.run.window, np.arange(len(self.dynamics.robot.joints))
-        rows = window.piece_rows(np.full(joints.size, piece), joints, int(window.highest[piece]))
-        errors = np.minimum([rows.error(order) for order in range(3)], _UNKNOWN)
-        chosen = window.coefficients[:, piece]
-        state = [horner(derivative_coefficients(chosen, k), np.full(joints.size, local)) for k in range(3)]
-        moved = np.eye(errors.size).reshape(-1, *errors.shape) * errors + state
-        efforts = self.dynamics.rigid_effort(*np.swapaxes([*moved, state], 0, 1))[:, self.joint]
-        viscous = self.dynamics.robot.joints[self.joint].friction.viscous * errors[1, self.joint]
-        return float(np.abs(efforts[:-1] - efforts[-1]).sum() + viscous)
-
-    def _finding(self, piece: int, local: float, rounding: float) -> Finding:
-        from trajcli.limits.effort import effort_excess
-
-        window, peak = self.run.window, replace(self.peak, time=float(self.run.window.t[piece]) + local)
-        found = effort_excess(self.run.robot, self.survey, self.joint, self.sign, self.limit, peak)
-        return replace(found, row=window.row_at(piece, local), rounding=rounding)

@@ -272,7 +272,12 @@ class MotionJudge:
             robot, pieces = self._requirements.robot_between(before, after), slice(low, high)
             arguments = (window, pieces, robot.limits, before, self._axes, self._worst)
             carries_one = self._requirements.carries_one(before, after)
-            judge_limits(JudgedRun(window, pieces, robot, self._worst, asked, carries_one))
+            run = JudgedRun(window, pieces, robot, self._worst, asked, carries_one)
+            judge_limits(run)
+            if run.limits_efforts:
+                from trajcli.judge.recorded_efforts import judge_efforts
+
+                judge_efforts(run)
             judge_consistency(*arguments, changes, flips)
             if self._tool is not None:
                 self._tool.see(window, pieces, robot, before, asked=asked)

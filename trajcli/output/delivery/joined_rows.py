@@ -108,6 +108,10 @@ class JoinedRows:
 
             for run in self._runs(window, worst):
                 judge_limits(run)
+                if run.limits_efforts:
+                    from trajcli.judge.recorded_efforts import judge_efforts
+
+                    judge_efforts(run)
             if tool is not None:
                 self._see_tool(tool, window)
             if first_only and self._judgement(begun, worst, tool, slack).findings:
