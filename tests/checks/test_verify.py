@@ -73,6 +73,20 @@ def test_what_nobody_limits_is_said() -> None:
     assert verify(whole, [all_bounded, mirrored]).unchecked == expected
 
 
+def test_what_nobody_limits_where_the_arm_stands_is_not_missing() -> None:
+    """Between two moves with limits of their own a hold, and what takes no time, have those of the job: none."""
+    nowhere = constant([1.0], 0.0)
+    whole = trajectory(between([0.0], [1.0]), nowhere, constant([1.0], 1.0), between([1.0], [0.0]), nowhere)
+    bounded = limits(position=9.0, velocity=9.0, acceleration=9.0, jerk=99.0)
+    jerky = replace(bounded, jerk=limits().jerk)
+    assert verify(whole, [bounded, limits(), limits(), bounded, limits()]).unchecked == ()
+    for k in (0, 3):
+        assert verify(whole, [jerky if k == move else bounded for move in range(5)]).unchecked == (
+            ("j1", "jerk"),
+        )
+    assert ("j1", "jerk") in verify(whole, [limits()] * 5).unchecked
+
+
 @pytest.mark.parametrize(("loaded", "unchecked"), [((), ()), ((1,), ()), ((2,), (("j1", "effort"),))])
 def test_efforts_are_left_unchecked_where_a_load_is_moved(loaded: tuple[int, ...], unchecked: Any) -> None:
     """The second of three moves takes no time, and so nothing is moved in it."""

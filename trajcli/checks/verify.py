@@ -43,8 +43,8 @@ class Verdict:
         findings: What is wrong, by move and time.
         steps: Legal steps in acceleration, in order of time.
         peaks: For each span the extremes of position, velocity, acceleration and jerk, times on the curve.
-        unchecked: (joint, quantity) that some move leaves unlimited in at least one direction; an effort only
-            where the tool carries something.
+        unchecked: (joint, quantity) that some move leaves unlimited in at least one direction, where the arm
+            moves if moves differ in limits; an effort only where the tool carries something.
         unchecked_of_tool: Limits of the tool that are stated and cannot be judged in some move: of an arm
             without geometry.
         sampled: What of moves along a path is judged on rows alone, which is no proof of what lies between
@@ -133,7 +133,7 @@ def verify(
         findings=_in_order(trajectory, findings, promises),
         steps=acceleration_steps(trajectory, limits_by_move, peaks),
         peaks=peaks,
-        unchecked=_unchecked(trajectory, limits_by_move),
+        unchecked=_unchecked(trajectory, limits_by_move, peaks),
         sampled=_sampled(tools),
         unchecked_of_tool=_unchecked_of_tool(moves, peaks),
         surveys=surveys,
@@ -375,24 +375,31 @@ def _unchecked_of_tool(moves: _LimitedMoves, peaks: IntervalPeaks) -> tuple[str,
     return tuple(name for name in vars(_NO_TOOL_LIMITS) if name in names)
 
 
-def _unchecked(trajectory: Trajectory, limits_by_move: Sequence[Limits]) -> tuple[tuple[str, str], ...]:
-    loaded = [
-        limits
-        for limits, span in zip(limits_by_move, trajectory.spans, strict=True)
-        if span.payload is not None and span.duration > 0
+def _unchecked(
+    trajectory: Trajectory, limits_by_move: Sequence[Limits], peaks: IntervalPeaks
+) -> tuple[tuple[str, str], ...]:
+    lasting = [
+        (k, limits)
+        for k, (limits, span) in enumerate(zip(limits_by_move, trajectory.spans, strict=True))
+        if span.duration > 0
     ]
+    loaded = [limits for k, limits in lasting if trajectory.spans[k].payload is not None]
+    moving: Sequence[Limits] = limits_by_move
+    if len(numbered(limits_by_move)[1]) > 1:  # a stop between two moves has the limits of the job
+        moving = [limits for k, limits in lasting if peaks[k][1].magnitude.any()]
+    of_quantities = {name: moving for name in QUANTITIES} | {"effort": loaded}
     unlimited = [
         np.any(
             [np.isinf(getattr(limits, name)).any(axis=1) for limits in numbered(some)[1]]
             or np.zeros((1, len(trajectory.joint_names))),
             axis=0,
         )
-        for name, some in [*((name, limits_by_move) for name in QUANTITIES), ("effort", loaded)]
+        for name, some in of_quantities.items()
     ]
     return tuple(
         (name, quantity)
         for joint, name in enumerate(trajectory.joint_names)
-        for quantity, of_joints in zip((*QUANTITIES, "effort"), unlimited, strict=True)
+        for quantity, of_joints in zip(of_quantities, unlimited, strict=True)
         if of_joints[joint]
     )
 
