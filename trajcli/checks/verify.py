@@ -387,7 +387,7 @@ def _unchecked(
     moving: Sequence[Limits] = limits_by_move
     if len(numbered(limits_by_move)[1]) > 1:  # a stop between two moves has the limits of the job
         moving = [limits for k, limits in lasting if peaks[k][1].magnitude.any()]
-    of_quantities = {name: moving for name in QUANTITIES} | {"effort": loaded}
+    of_quantities = dict.fromkeys(QUANTITIES, moving) | {"effort": loaded}
     unlimited = [
         np.any(
             [np.isinf(getattr(limits, name)).any(axis=1) for limits in numbered(some)[1]]
