@@ -45,6 +45,7 @@ class Amount:
         dimension: "length" or "angle" of the tool; with neither this nor a joint the number is a time.
         rounded: "up" for a lower bound, "down" for an upper one: the number that is shown keeps it.
         unit: Where it is the same in all units of a job, such as "N m".
+        digits: Of the number that is shown, in its unit; of coordinates nine.
     """
 
     value: float | tuple[float, ...]
@@ -53,6 +54,7 @@ class Amount:
     dimension: Literal["length", "angle"] | None = None
     rounded: Literal["up", "down"] | None = None
     unit: str | None = None
+    digits: int = _DIGITS
 
     def __str__(self) -> str:
         if self.unit is not None:
@@ -64,7 +66,7 @@ class Amount:
         """Return the number, or the coordinates in brackets, each after `scale`."""
         if isinstance(self.value, tuple):
             return "[" + ", ".join(f"{scale(value) + 0.0:.9g}" for value in self.value) + "]"
-        return f"{_towards(scale(self.value), self.rounded):.{_DIGITS}g}"
+        return f"{_towards(scale(self.value), self.rounded, self.digits):.{self.digits}g}"
 
 
 def at_least(value: float) -> str:

@@ -103,3 +103,21 @@ def test_an_option_without_its_value_is_told(arms):
         outcome = arms.call(*words)
         assert (outcome.code, outcome.out) == (2, "")
         assert f"Option '{words[-1]}' requires an argument" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("given", "missed", "advice"),
+    [
+        ({"direction": [1, 0, 0]}, 90, "no joint turns the z axis of the tool"),
+        ({"pitch": 20}, 110, "no joint turns the z axis of the tool"),  # it points down
+        ({"rpy": [77, 0, 0]}, 103, "leave coordinates of its orientation free"),
+    ],
+)
+def test_an_orientation_alone_that_a_scara_cannot_have_is_missed_by_the_degrees_between(
+    arms, given, missed, advice
+):
+    """Its tool points down: what is lacking is the angle to there, in the user's unit."""
+    outcome = arms.call("ik", "-r", "scara", "--pose", json.dumps(given))
+    assert outcome.code == 3, outcome.err
+    assert f"it comes within 0 m and {missed} deg\n" in outcome.err
+    assert advice in outcome.err

@@ -105,3 +105,17 @@ def test_pins_alone_are_no_pose(arms, on_rail):
     outcome = arms.call("ik", "--robot", on_rail, "--pose", "{joints: {rail: 2}}")
     assert outcome.code == 2
     assert "the target fixes nothing" in outcome.err
+
+
+@pytest.mark.parametrize(("pinned", "helps"), [("j1", False), ("j4", True)])
+def test_another_orientation_is_advised_where_the_joints_that_are_left_reach_the_position(
+    arms, pinned, helps
+):
+    """With joint 1 of a SCARA at zero its tool is on a circle about (0.325, 0), and not at x = 0."""
+    pose = {"xyz": [0, 0.5, -0.1], "yaw": 30, "tool_axis": "x", "joints": {pinned: 0}}
+    outcome = arms.call("ik", "--robot", "scara", "--pose", json.dumps(pose))
+    assert outcome.code == 3
+    assert "cannot reach" in outcome.err
+    assert ("or leave coordinates of its orientation free" in outcome.err) is helps
+    del pose["yaw"], pose["tool_axis"]
+    assert arms.call("ik", "--robot", "scara", "--pose", json.dumps(pose)).code == (0 if helps else 3)

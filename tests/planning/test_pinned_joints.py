@@ -266,6 +266,13 @@ def test_a_pinned_rail_that_leaves_the_arm_behind_is_named(begin, end: float, ra
     assert ", or give rail another value at the target" in text
 
 
+def test_no_other_orientation_is_advised_where_the_arm_is_left_behind_in_any() -> None:
+    far = json.dumps({**HEAD, "moves": [go(xyz=[5.9, 0.2, 0.9], joints={"rail": 0})]})
+    with pytest.raises(TrajcliError, match="cannot reach the pose") as caught:
+        plan_job(job_from_text(far))
+    assert caught.value.problems[0].hint == "move the target"
+
+
 def test_another_value_of_a_pinned_rail_lets_the_arm_reach_the_path() -> None:
     line = {"planner": "line", "to": {"xyz": [4.5, 0.2, 0.9], "joints": {"rail": 3.4}}, "law": LAW}
     planned(go(joints={"rail": 1.0}), line)

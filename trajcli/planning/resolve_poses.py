@@ -80,13 +80,15 @@ def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPos
     from trajcli.language.targets import ik_target
 
     wanted = ik_target(target)
+    moving = robot
     if target.pinned is None:
         solutions = solve(robot, wanted, near)
     else:
-        from trajcli.kinematics.inverse.pinned_joints import solve_pinned
+        from trajcli.kinematics.inverse.pinned_joints import solve_pinned, without_pinned
 
         solutions = solve_pinned(robot, wanted, target.pinned.by_index, near)
-    turning_helps = bool(solutions.valid.any()) or reached_if_turned(robot, wanted)
+        moving = without_pinned(robot, target.pinned.by_index)
+    turning_helps = bool(solutions.valid.any()) or reached_if_turned(moving, wanted)
     check_reachable(robot, solutions, turning_helps=turning_helps)
     names = [str(name) for name in solutions.names]
     usable = solutions.within_limits & _of_configuration(

@@ -73,12 +73,12 @@ def _words(plan: Plan, zone: FlownZone) -> Iterator[str]:
     of = plan.trajectory.joint_names[zone.joint] if zone.joint is not None else zone.of
     dimension = {"position": "length", "orientation": "angle"}.get(zone.of)
     sizes = [
-        say(Amount(float(f"{value:.4g}"), dimension=dimension, joint=zone.joint))  # type: ignore[arg-type]
+        say(Amount(value, dimension=dimension, joint=zone.joint, digits=4))  # type: ignore[arg-type]
         for value in (zone.used, zone.asked)
     ]
     yield f"{sizes[0]} of {sizes[1]} ({of})"
     if zone.nearest is not None:
-        nearest = say(Amount(float(f"{zone.nearest:.3g}"), dimension="length"))
+        nearest = say(Amount(zone.nearest, dimension="length", digits=3))
         yield f"the tool comes to {nearest} from the corner"
     yield f"binding: {zone.binds}"
 

@@ -139,7 +139,8 @@ def require_answer(arm: ArmInUnits, solutions: Solutions, chosen: Flags, wanted:
             hint=f"within the limits: {'; '.join(others)}" if others else "no other branch is inside either",
         )
     try:
-        turning_helps = bool(solutions.valid.any()) or reached_if_turned(arm.robot, wanted.target)
+        moving = without_pinned(arm.robot, wanted.pins) if wanted.pins else arm.robot
+        turning_helps = bool(solutions.valid.any()) or reached_if_turned(moving, wanted.target)
         check_reachable(arm.robot, solutions, turning_helps=turning_helps)
     except PlanningError as error:
         raise error.said_by(arm.say) from None

@@ -160,8 +160,8 @@ def check_reachable(robot: Robot, solutions: Solutions, *, turning_helps: bool =
         metres, radians = solutions.shortfall[index].tolist()
         amounts: Amounts = {
             "robot": robot.name,
-            "distance": Amount(float(f"{metres:.6g}"), 0, None, "length"),
-            "angle": Amount(float(f"{round(radians, 12):.6g}"), 0, None, "angle"),
+            "distance": Amount(metres, dimension="length", digits=6),
+            "angle": Amount(round(radians, 12), dimension="angle", digits=6),
         }
         message = f"{{robot}} cannot reach the pose{which}: it comes within {{distance}} and {{angle}}"
         raise PlanningError(
