@@ -83,6 +83,7 @@ FAMILIES = {
         8,
         "spherical wrist",
     ),
+    "RRP with a slanted slide": (["R 0 .3 0 .8", "R 0 .1 0 .6", "P 0 .2 .1 0"], 4, "positioning"),
 }
 
 

@@ -93,6 +93,19 @@ def test_poses_are_met_within_the_limits_and_their_joints_recovered(robot: Robot
     assert found.closure[found.valid].max() < 1e-10
 
 
+@pytest.mark.parametrize("limits", [(-7.0, 7.0), (-np.inf, np.inf), (-np.inf, 2.0)])
+def test_where_the_arm_stands_is_the_nearest_answer_also_beyond_a_turn_of_the_last_joint(limits) -> None:
+    bounds = PANDA.limits.position.copy()
+    bounds[-1] = limits
+    robot = replace(PANDA, limits=replace(PANDA.limits, position=bounds))
+    q = random_joints(PANDA, 12)
+    q[:, -1] = np.random.default_rng(2).uniform(*np.clip(limits, -9.0, 9.0), 12)
+    found = solve(robot, forward(robot, q), q)
+    best = found.nearest(q)
+    assert (best >= 0).all()
+    np.testing.assert_allclose(found.joints[np.arange(12), best], q, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("robot", ARMS.values(), ids=ARMS)
 def test_no_seed_of_a_search_leads_nearer(robot: Robot) -> None:
     poses = forward(robot, random_joints(robot, 6, seed=2))

@@ -213,3 +213,48 @@ def test_what_is_close_to_an_axis_still_tells_its_angle(monkeypatch, name, close
     (ours, ours_valid), (_, theirs_valid) = both(robot, name, kind, poses, by_polynomials)
     assert ours_valid.sum() == theirs_valid.sum()
     assert gap(robot, ours[0][ours_valid[0]], joints).min() < SAME
+
+
+@pytest.mark.parametrize("close", [1e-4, 1e-5])
+@pytest.mark.parametrize("name", ["two axes that meet", "elbow", "elbow on a slanted axis"])
+def test_a_tcp_that_is_close_to_the_last_axis_tells_the_angle_about_it(monkeypatch, name, close):
+    rows = FAMILIES[name][0]
+    kind, theta, d, _, alpha = rows[2].split()
+    close_row = f"{kind} {theta} {d} {close} {alpha}"
+    monkeypatch.setitem(FAMILIES, "close", ([*rows[:2], close_row], 4, "positioning"))
+    robot, joints = arm("close"), np.array([0.3, 0.7, 1.1])
+    poses = forward(robot, joints)[None]
+    (ours, ours_valid), (_, theirs_valid) = both(robot, "close", "position", poses, by_polynomials)
+    assert ours_valid.sum() == theirs_valid.sum()
+    assert gap(robot, ours[0][ours_valid[0]], joints).min() < SAME
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("planar RP", 1), ("RRP Stanford", 1), ("RRP with a slanted slide", 2)]
+)
+def test_a_double_root_of_a_slide_is_one_answer(name, count):
+    """Where the tcp is at the foot, on the slide's line, of the axis before it two lengths have met.
+
+    The shoulder of a Stanford arm has another point to slide from; two axes that meet have two turns for each length.
+    """
+    robot = arm(name)
+    axes, home = polynomials.arm_axes(robot)
+    joints = np.array([0.3, 0.7, 0.0])[-len(axes) :]
+    before, tip = axes[-2], home @ [0.0, 0.0, 0.0, 1.0]
+    joints[-1] = -(tip[:3] - before.o) @ axes[-1].h
+    found = solve(robot, partial_target(forward(robot, joints)[:3, 3]))
+    answers = found.joints[found.valid]
+    assert gap(robot, answers, joints).min() < 1e-6
+    assert (np.abs(answers[:, -1] - joints[-1]) < 1e-6).sum() == count
+
+
+def test_an_aim_that_is_too_near_for_a_slide_is_missed_by_what_lies_between():
+    """No length of the slide brings the tcp nearer to the axis than its line is: the foot is the nearest point."""
+    robot = arm("planar RP")
+    axes, home = polynomials.arm_axes(robot)
+    joints = np.array([0.7, -(home[:3, 3] - axes[0].o) @ axes[1].h])
+    away = forward(robot, joints)[:3, 3] - axes[0].o
+    away -= (away @ axes[0].h) * axes[0].h
+    found = solve(robot, partial_target(forward(robot, joints)[:3, 3] - 0.6 * away))
+    assert not found.valid.any()
+    assert found.shortfall[0] == pytest.approx(0.6 * np.linalg.norm(away), rel=1e-9)

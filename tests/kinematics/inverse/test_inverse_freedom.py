@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from inverse_arms import arm, gap, random_joints
 from oracle_robots import robot_of, robots
+from scipy.optimize import fsolve
 
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.self_motion import nearest_on_self_motions
@@ -129,6 +130,27 @@ def test_singular_is_told_from_free():
         assert found.joints[best] == pytest.approx(joints, abs=1e-6)
         assert bool(found.singular[best]) is lost
         assert found.free[best].tolist() == [False, False, False, lost, False, True]
+
+
+@pytest.mark.parametrize(
+    ("name", "about"),
+    [
+        ("two axes that meet", [-2.8, -5.0]),
+        ("RRP with a slanted slide", [-2.8, -0.5]),
+        ("elbow", [-1.5, -3.1]),
+        ("elbow on a slanted axis", [-1.3, -2.8]),
+    ],
+)
+def test_a_tcp_on_the_first_axis_leaves_its_joint_free_and_it_stays_where_it_was(name, about):
+    robot = arm(name)
+    rest = fsolve(lambda rest: forward(robot, [0.0, *rest])[:2, 3], about, xtol=1e-13)
+    position = forward(robot, [0.4, *rest])[:3, 3]
+    assert np.abs(forward(robot, [2.0, *rest])[:3, 3] - position).max() < 1e-12  # wherever joint 1 is
+    found = solve(robot, partial_target(position), near=[1.4, *rest])
+    assert found.singular[found.valid].all()
+    assert found.free[found.valid].tolist() == [[True, False, False]] * int(found.count)
+    assert gap(robot, found.joints[found.valid], np.array([1.4, *rest])).min() < 1e-7
+    assert found.joints[found.valid][:, 0] == pytest.approx(1.4, abs=1e-7)
 
 
 def test_the_limits_hold_while_the_nearest_is_sought():

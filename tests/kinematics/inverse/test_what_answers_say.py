@@ -53,7 +53,9 @@ def test_another_orientation_helps_where_the_coordinates_that_count_are_within_r
     assert not reached_if_turned(flat, partial_target([0.3, 0.2, 0.0]))  # it has none, and is met
     assert not reached_if_turned(flat, partial_target([3.0, 0.2, 0.0], direction=[0, 0, 1.0]))
     for alone in ({"direction": [1.0, 0, 0]}, {"pitch": 0.2}, {"rotation": np.diag([1.0, -1, -1])}):
-        assert reached_if_turned(arm("SCARA"), partial_target(**alone))  # nothing is left that could be missed
+        assert reached_if_turned(
+            arm("SCARA"), partial_target(**alone)
+        )  # nothing is left that could be missed
 
 
 @pytest.mark.parametrize("name", ["planar 2R", "planar RP"])

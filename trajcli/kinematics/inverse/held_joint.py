@@ -88,10 +88,11 @@ class _Samples:
 
     def __init__(self, robot: Robot, held: Robot, poses: Array, near: Array) -> None:
         low, high = robot.limits.position[-1].tolist()
+        last = np.clip(near[:, -1], low, high)
         if not high - low < FULL:
             low, high = -np.pi, np.pi
         step = (high - low) / _SAMPLES
-        offset = np.mod(np.clip(near[:, -1], low, high) - low, step)
+        offset = np.mod(last - low, step)
         self._last: Array = np.clip(low + offset + step * np.arange(-1, _SAMPLES + 1)[:, None], low, high)
         count, samples = len(near), len(self._last)
         wanted = poses_for_the_others(robot, poses, self._last)

@@ -70,7 +70,8 @@ class Solutions:
     def shortfall(self) -> Array:
         """How far the nearest branch stays away, shape (*batch, 2), m and rad; zero where one is valid.
 
-        A closed form then brings the wrist as near to its aim as it can, with the orientation met.
+        A closed form then takes the wrist near to its aim with the orientation met, joint by joint: planar arms
+        come as near as they can, others may come nearer with a shoulder that turns further.
         """
         size = np.where(np.isfinite(self.closure), self.closure, np.inf).sum(axis=-1)
         best = np.asarray(np.argmin(size, axis=-1))[..., None, None]
