@@ -70,8 +70,8 @@ class Solutions:
     def shortfall(self) -> Array:
         """How far the nearest branch stays away, shape (*batch, 2), m and rad; zero where one is valid.
 
-        A closed form then takes the wrist near to its aim with the orientation met, joint by joint: planar arms
-        come as near as they can, others may come nearer with a shoulder that turns further.
+        A closed form then takes the wrist near to its aim with the orientation met, a joint at a time: planar
+        arms come as near as they can, others may come nearer with another turn of the shoulder.
         """
         size = np.where(np.isfinite(self.closure), self.closure, np.inf).sum(axis=-1)
         best = np.asarray(np.argmin(size, axis=-1))[..., None, None]

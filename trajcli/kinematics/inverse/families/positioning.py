@@ -280,12 +280,12 @@ def _sides_of(one: ScrewAxis, two: ScrewAxis) -> tuple[Floats, Floats]:
 
 
 def _match_turns(axes: tuple[ScrewAxis, ...], length: float, sides: Sides) -> StructureMatch | None:
-    one, two, three = axes
+    one, two, _ = axes
     if is_elbow(axes):
         ahead, upward = sides or _sides_of(one, two)
         return "elbow", ("shoulder", "elbow"), partial(elbow, axes, forward=ahead, upward=upward)
     center = meeting_point(one, two, length)
-    if center is not None and not parallel(two, three):
+    if center is not None:
         return "two axes that meet", ("elbow", "shoulder"), partial(ball, axes, center)
     return None
 
