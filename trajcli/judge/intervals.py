@@ -25,6 +25,7 @@ that changes its law once between two rows (0.143 and 1.5 at most)."""
 _CURVED = 0.1
 """Likewise of the jump of the derivative after that: how far a piece bends beside a motion that bends on
 (1/12 at most)."""
+_AT_ONCE = 256  # pieces whose rounding is looked at together
 HIGHEST = {"hold": 0, "linear": 1, "cubic": 2, "quintic": 3, "jtc-upsampling": 3}
 """Highest derivative that pieces of an interpolation determine."""
 
@@ -123,6 +124,15 @@ class Intervals:
         spline = self.interpolation == "jtc-upsampling"
         return PieceRows(self.lengths[piece], self.late[piece], tuple(ends), tuple(errors), spline)
 
+    def rows_by_level(self, pieces: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], PieceRows]]:
+        """Yield which pieces determine equally many derivatives, and the rows of all their joints."""
+        joints, levels = np.arange(self.coefficients.shape[2]), self.highest[pieces]
+        for level in set(levels.tolist()):
+            chosen = np.flatnonzero(levels == level)
+            count = 1 if self.interpolation == "jtc-upsampling" else max(level, 1)
+            every = np.repeat(pieces[chosen], joints.size)
+            yield chosen, self.piece_rows(every, np.tile(joints, chosen.size), count)
+
     def runs(self) -> Iterator[tuple[tuple[int, int], int, int]]:
         """Yield the moves before and after intervals, and the first and the last + 1 of neighbours alike."""
         pairs = np.stack([self.moves[self.first : self.last], self.moves[self.first + 1 : self.last + 1]])
@@ -199,3 +209,10 @@ class JoinedPairs(Intervals):
     def row_at(self, piece: int, local: float) -> int:
         """Return the number of the row at a time within a piece, or before it."""
         return int(self.rows[piece]) + int(local >= self.lengths[piece] * (1 - 1e-12))
+
+
+def largest_first(sizes: Array, chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
+    """Yield the indices of those of some sizes (m,) that are chosen, the largest first, many at a time."""
+    order = np.flatnonzero(chosen)[np.argsort(-sizes[chosen], kind="stable")]
+    for low in range(0, order.size, _AT_ONCE):
+        yield order[low : low + _AT_ONCE]

@@ -22,7 +22,7 @@ from trajcli.dynamics.effort_bound import EffortPeak, EffortSurvey, effort_surve
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.findings import Certainty, FindingMethod, FindingSeverity
 from trajcli.frozen import frozen
-from trajcli.judge.intervals import DENSE, Intervals
+from trajcli.judge.intervals import DENSE, Intervals, largest_first
 from trajcli.judge.joint_limits import JudgedRun
 from trajcli.judge.rounding import PieceRows
 from trajcli.limits.effort import effort_excess
@@ -31,7 +31,6 @@ from trajcli.limits.tolerances import EFFORT_RELATIVE
 _STILL = 1e-9  # rad/s or m/s: rest, as files of nine decimals tell it
 _UNKNOWN = 1e9  # SI: of a rate that rounding hides
 _ACCELERATED = 2  # derivatives that a piece determines where it has an acceleration
-_AT_ONCE = 256  # pieces whose rounding is looked at together
 _MOMENT = 1e-12  # s: a motion so short has one effort
 _SPACING = 4.0  # units in the last place by which times of one moment differ
 
@@ -184,7 +183,7 @@ class _EffortJudge:
         over = reached > limit * (1 + EFFORT_RELATIVE)
         if not self.run.asked:
             over &= self._lengths > DENSE
-        for some in _worst_first(reached, over):
+        for some in largest_first(reached, over):
             certain = reached[some] - limit > self._roundings(joint, some, self._lengths[some] / 2)
             if certain.any():
                 at = int(some[certain.argmax()])
@@ -198,7 +197,7 @@ class _EffortJudge:
         """Return the largest effort that rows state, of those that rounding does not explain."""
         stated = self._stated
         efforts = sign * stated.efforts[:, joint]
-        for some in _worst_first(efforts, efforts > limit * (1 + EFFORT_RELATIVE)):
+        for some in largest_first(efforts, efforts > limit * (1 + EFFORT_RELATIVE)):
             rounding = self._spread(joint, stated.values[:, some], stated.errors[:, some])
             rounding = rounding + stated.friction[some, joint]
             certain = efforts[some] - limit > rounding
@@ -222,7 +221,7 @@ class _EffortJudge:
         still, lengths = _still(self.run.window), self._lengths
         parts = [
             (chosen, np.full(chosen.size, share) * lengths[chosen], *state)
-            for chosen, rows in self._rows(np.arange(self.curved.size))
+            for chosen, rows in self.run.window.rows_by_level(self.curved)
             for share, state in _states_of(rows)
         ]
         at = np.concatenate([np.empty(0, dtype=np.intp), *(part[0] for part in parts)])
@@ -241,19 +240,10 @@ class _EffortJudge:
         values = np.stack([q, rates, qdd])
         return _States(at, local, values, errors, friction, self.dynamics.effort(q, rates, qdd))
 
-    def _rows(self, pieces: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], PieceRows]]:
-        """Yield curved pieces of equal degree, and their rows: of each piece those of all joints."""
-        window, joints = self.run.window, np.arange(len(self.dynamics.links))
-        levels = window.highest[self.curved[pieces]]
-        for level in set(levels.tolist()):
-            chosen = np.flatnonzero(levels == level)
-            every = np.repeat(self.curved[pieces[chosen]], joints.size)
-            yield chosen, window.piece_rows(every, np.tile(joints, chosen.size), level)
-
     def _roundings(self, joint: int, pieces: NDArray[np.intp], local: Array) -> Array:
         """Return by how much the effort of a joint may be off at a time of each of some curved pieces."""
         result, count = np.empty(pieces.size), len(self.dynamics.links)
-        for chosen, rows in self._rows(pieces):
+        for chosen, rows in self.run.window.rows_by_level(self.curved[pieces]):
             errors = np.reshape([rows.error(order) for order in range(3)], (3, chosen.size, count))
             curves = self.run.window.coefficients[:, self.curved[pieces[chosen]]]
             state = [horner(derivative_coefficients(curves, k), local[chosen, None]) for k in range(3)]
@@ -283,13 +273,6 @@ def _states_of(rows: PieceRows) -> Iterator[tuple[float, tuple[Array, Array]]]:
         means = [both.mean(axis=0) for both in rows.ends]
         apart = [e + np.abs(both[1] - both[0]) / 2 for e, both in zip(rows.errors, rows.ends, strict=True)]
         yield 0.5, (np.stack([*means, change]), np.stack([*apart, off]))
-
-
-def _worst_first(sizes: Array, chosen: NDArray[np.bool_]) -> Iterator[NDArray[np.intp]]:
-    """Yield indices of some sizes, some at a time, the largest first."""
-    order = np.flatnonzero(chosen)[np.argsort(-sizes[chosen], kind="stable")]
-    for low in range(0, order.size, _AT_ONCE):
-        yield order[low : low + _AT_ONCE]
 
 
 def _part(survey: EffortSurvey, chosen: NDArray[np.bool_]) -> EffortSurvey:

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from trajcli.curves.node_bound import at_nodes
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.findings import Collector, Finding, at_time
+from trajcli.findings import Collector, Finding, FindingMethod, at_time
+from trajcli.frozen import frozen
 from trajcli.geometry.rotation import log
-from trajcli.judge.intervals import DENSE, Intervals
+from trajcli.judge.intervals import DENSE, Intervals, largest_first
+from trajcli.judge.rounding import PieceRows
 from trajcli.judge.tool_path import RecordedPath
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.motion import ToolMotion
@@ -20,6 +23,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import revolute
 from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd
 from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.tool_derivatives import tool_derivatives
 from trajcli.limits.kinds import TOOL_KINDS, LimitKind
 from trajcli.limits.tolerances import TOOL_RELATIVE
 from trajcli.limits.tool import limits_tool, tool_excess, tool_peaks
@@ -44,6 +48,25 @@ def judge_of_moves(robot: Robot, moves: Sequence[PlannedMove]) -> ToolJudge:
     from trajcli.planning.planned_move import path_of_tool
 
     return ToolJudge(robot, {move.index: path_of_tool(move) for move in moves}, moves)
+
+
+@frozen
+class _Excess:
+    """A derivative of the tool over its limit.
+
+    Attributes:
+        piece: Where it is.
+        local: Seconds from the start of the piece.
+        value: SI.
+        rounding: By how much it may be off, SI.
+        method: Of the finding.
+    """
+
+    piece: int
+    local: float
+    value: float
+    rounding: float
+    method: FindingMethod = "bounded"
 
 
 class ToolJudge:
@@ -142,24 +165,117 @@ class ToolJudge:
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
             if order > int(window.highest[pieces].max()) or peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
                 continue
-            at = piece, local = self._piece_at(window, pieces, robot, kind, breaks, peak.time)
-            rounding, row = self._rounding(window, at, kind), window.row_at(piece, local)
+            piece, local = self._piece_at(window, pieces, robot, kind, breaks, peak.time)
+            (rounding,) = self._roundings(window, np.array([piece]), np.array([local]), kind).tolist()
+            found = _Excess(piece, local, peak.upper_bound, rounding)
+            certain = found.value - limit > rounding
             slack = limit * (1 + _CLOSE) + rounding
-            between = not asked and peak.upper_bound <= _TWICE * limit
+            between = certain and not asked and found.value <= _TWICE * limit
             warned = between and self._only_between(window, pieces, robot, kind, slack)
-            time = float(window.t[piece]) + local
-            found = replace(tool_excess(kind, peak.upper_bound, limit, time), row=row, rounding=rounding)
-            certain = peak.upper_bound - limit > rounding
-            count = max(self._over(window, pieces, robot, kind, limit), 1)
-            self._worst.add(
-                kind.name,
-                move,
-                np.full(count, -1),
-                np.full(count, peak.upper_bound / limit),
-                lambda _: found,  # noqa: B023 - of each move it is made at once
-                severity="warning" if warned and certain else "error",
-                certainty="exceeded" if certain else "within rounding",
-            )
+            if not certain or warned:  # rounding, or dense rows, explain the largest: not what is elsewhere
+                other = self._curve_over(window, pieces, robot, kind, limit, asked=asked)
+                other = other or self._stated_over(window, pieces, robot, kind, limit)
+                if other is not None:
+                    found, certain, warned = other, True, False
+            self._note(window, pieces, robot, kind, limit, move, found, certain=certain, warned=warned)
+
+    def _note(
+        self,
+        window: Intervals,
+        pieces: slice,
+        robot: Robot,
+        kind: LimitKind,
+        limit: float,
+        move: int,
+        found: _Excess,
+        *,
+        certain: bool,
+        warned: bool,
+    ) -> None:
+        count = max(self._over(window, pieces, robot, kind, limit), 1)
+        time, row = float(window.t[found.piece]) + found.local, window.row_at(found.piece, found.local)
+        excess = tool_excess(kind, found.value, limit, time)
+        finding = replace(excess, row=row, rounding=found.rounding, method=found.method)
+        self._worst.add(
+            kind.name,
+            move,
+            np.full(count, -1),
+            np.full(count, found.value / limit),
+            lambda _: finding,
+            severity="warning" if warned else "error",
+            certainty="exceeded" if certain else "within rounding",
+        )
+
+    def _curve_over(
+        self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, limit: float, *, asked: bool
+    ) -> _Excess | None:
+        """Return the largest derivative that rounding does not explain, nor that rows are dense."""
+        order, angular = kind.order or 1, kind.dimension == "angle"
+        coefficients, lengths = window.coefficients[:, pieces], window.lengths[pieces]
+        rates = at_nodes(coefficients, lengths, order)
+        vectors = tool_derivatives(robot, rates).reshape(*rates[0].shape[:2], 2 * order, 3)
+        reached = np.linalg.norm(vectors[:, :, 2 * order - 2 + angular], axis=2).max(axis=1)
+        over = (reached > limit * (1 + TOOL_RELATIVE)) & (window.highest[pieces] >= order)
+        if not asked:
+            over &= (lengths > DENSE) | (reached > _TWICE * limit)
+        for some in largest_first(reached, over):
+            roundings = self._roundings(window, some + pieces.start, lengths[some] / 2, kind)
+            certain = np.flatnonzero(reached[some] - limit > roundings)
+            if certain.size:
+                at, rounding = int(some[certain[0]]), float(roundings[certain[0]])
+                whole = np.array([0.0, lengths[at]])
+                peak = tool_peaks(robot, whole, coefficients[:, [at]])[kind.key]
+                return _Excess(at + pieces.start, peak.time, peak.upper_bound, rounding)
+        return None
+
+    def _stated_over(
+        self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, limit: float
+    ) -> _Excess | None:
+        """Return the largest mean between two rows that is over a limit by more than rounding explains."""
+        order, numbers, worst = kind.order or 1, np.arange(pieces.start, pieces.stop), None
+        for chosen, rows in window.rows_by_level(numbers):
+            if len(rows.ends) < order:
+                continue
+            length, late = (each.reshape(chosen.size, -1)[:, 0] for each in (rows.length, rows.late))
+            change, off = self._change(rows, robot, kind)
+            mean, least = change / length, (change - off) / (length + late)
+            mean = np.where(least > limit * (1 + _CLOSE), mean, -np.inf)
+            at = int(mean.argmax())
+            if mean[at] > (limit if worst is None else worst.value):
+                rounding = float(mean[at] - least[at])
+                worst = _Excess(
+                    int(numbers[chosen[at]]), float(length[at]) / 2, float(mean[at]), rounding, "sampled"
+                )
+        return worst
+
+    def _change(self, rows: PieceRows, robot: Robot, kind: LimitKind) -> tuple[Array, Array]:
+        """Return how the derivative below a limited one changes between two rows, and its error, (m,)."""
+        order, angular = kind.order or 1, kind.dimension == "angle"
+        arm, turns = self._lever(kind)
+        q, *rates = (both.reshape(2, -1, turns.size) for both in rows.ends[:order])
+        errors = [np.reshape(each, (-1, turns.size)) @ turns for each in rows.errors[:order]]
+        if order == 1:
+            first, last = forward(robot, q)
+            turned = np.swapaxes(first[:, :3, :3], 1, 2) @ last[:, :3, :3]
+            change = log(turned) if angular else last[:, :3, 3] - first[:, :3, 3]
+            off = errors[0]
+        else:
+            below = tool_derivatives(robot, (q, *rates))[..., order - 2, int(angular), :]
+            change = below[1] - below[0]
+            sizes = [(np.abs(each) @ turns).max(axis=0) for each in rates]
+            off = errors[1] + errors[0] * sizes[0]
+            if order == 3:
+                off = errors[2] + 2.0 * sizes[0] * errors[1] + errors[0] * (sizes[1] + sizes[0] ** 2)
+        return np.linalg.norm(change, axis=1), 2.0 * arm * off
+
+    def _lever(self, kind: LimitKind) -> tuple[float, Array]:
+        """Return how far the tool goes when a joint turns by 1, and as what turns joints count, shape (n,).
+
+        What a slide moves by counts as a turn of the arm that moves its end as far; it turns nothing itself.
+        """
+        angular = kind.dimension == "angle"
+        arm = 1.0 if angular else self._length
+        return arm, np.where(revolute(self._robot), 1.0, 0.0 if angular else 1.0 / arm)
 
     @staticmethod
     def _piece_at(
@@ -210,31 +326,28 @@ class ToolJudge:
         part = twist[:, 3:] if kind.dimension == "angle" else twist[:, :3]
         return int((np.linalg.norm(part, axis=1) > limit).sum())
 
-    def _rounding(self, window: Intervals, at: tuple[int, float], kind: LimitKind) -> float:
-        """Return by how much a derivative of the tool may be off by rounding, at a time within a piece.
-
-        What a slide moves by counts as a turn of the arm that moves its end as far; it turns nothing itself.
-        """
-        (piece, local), order, angular = at, kind.order or 1, kind.dimension == "angle"
-        count = max(int(window.highest[piece]), 1)
-        joints = np.arange(window.coefficients.shape[2])
-        rows = window.piece_rows(np.full(joints.size, piece), joints, min(count, 3))
-        turning = revolute(self._robot)
-        arm = 1.0 if angular else self._length
-        turns = np.where(turning, 1.0, 0.0 if angular else 1.0 / arm)
-        errors = [float((turns * rows.error(k)).sum()) for k in range(order + 1)]
-        rates = [
-            float((turns * np.abs(horner(each, np.array(local)))).sum())
-            for each in (derivative_coefficients(window.coefficients[:, piece], k) for k in range(order + 1))
-        ]
-        total = arm * (errors[-1] + errors[0] * rates[order])
-        if order == 2:
-            total += 2.0 * arm * rates[1] * (errors[1] + errors[0] * rates[1])
-        if order == 3:
-            q, first, second = errors[:3]
-            total += 3.0 * arm * (rates[1] * second + (rates[2] + rates[1] ** 2) * first)
-            total += arm * q * rates[1] * (3.0 * rates[2] + rates[1] ** 2)
-        return total
+    def _roundings(self, window: Intervals, pieces: NDArray[np.intp], local: Array, kind: LimitKind) -> Array:
+        """Return by how much a derivative of the tool may be off by rounding, at times of some pieces."""
+        order, (arm, turns), result = kind.order or 1, self._lever(kind), np.empty(pieces.size)
+        counted = turns > 0.0  # what a length that rounding hides makes unknown of others is no matter
+        for chosen, rows in window.rows_by_level(pieces):
+            curves = window.coefficients[:, pieces[chosen]][..., counted]
+            errors = [
+                rows.error(k).reshape(chosen.size, -1)[:, counted] @ turns[counted] for k in range(order + 1)
+            ]
+            rates = [
+                np.abs(horner(derivative_coefficients(curves, k), local[chosen, None])) @ turns[counted]
+                for k in range(order + 1)
+            ]
+            total = errors[-1] + errors[0] * rates[order]
+            if order == 2:
+                total = total + 2.0 * rates[1] * (errors[1] + errors[0] * rates[1])
+            if order == 3:
+                q, first, second = errors[:3]
+                total = total + 3.0 * (rates[1] * second + (rates[2] + rates[1] ** 2) * first)
+                total = total + q * rates[1] * (3.0 * rates[2] + rates[1] ** 2)
+            result[chosen] = arm * total
+        return result
 
     def _judge_singularity(self, window: Intervals, pieces: slice, robot: Robot, move: int) -> None:
         """Warn where the smallest singular value of the scaled Jacobian is a small part of the largest."""

@@ -1,0 +1,108 @@
+"""Limits of the tool over rows of few decimals: what they state is over a limit, whatever the curve through them is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trajcli.findings import Finding
+from trajcli.judge.motion import Requirements, judge_motion
+from trajcli.judge.recorded_tool import ToolJudge
+from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
+from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+
+LARGEST, TURN = 3.0, 2 * np.pi
+SIZES = {"speed": LARGEST / TURN, "acceleration": LARGEST, "jerk": LARGEST * TURN}
+NEEDED = {"speed": 1, "acceleration": 2, "jerk": 3}  # columns of joints whose differences state it
+OF_ARMS = [("revolute", name) for name in (*SIZES, *(f"angular_{name}" for name in SIZES))] + [
+    ("prismatic", name) for name in SIZES
+]
+
+
+def swing(
+    joint: str, limit: str, share: float, t: np.ndarray, columns: int, decimals: int, *, asked: bool = False
+) -> tuple[str, list[Finding]]:
+    """Return the verdict and what is found of a tool that swings at 1 Hz by one joint, 1 m beside it where that turns.
+
+    Its limit is a share of the largest derivative of the joint; of a point that turns the square of the speed adds 2 %.
+    """
+    q = [LARGEST * TURN ** (k - 2) * np.sin(TURN * t + k * np.pi / 2)[:, None] for k in range(3)]
+    states = [np.round(values, decimals) for values in q[:columns]] + [None] * (3 - columns)
+    half = np.array([0.5 * 10.0**-decimals])
+    name = limit.removeprefix("angular_")
+    bounds = replace(unlimited(1), tcp=ToolLimits(**{limit: share * SIZES[name]}))
+    tool = np.eye(4)
+    tool[0, 3] = 1.0
+    robot = Robot("arm", (Joint("a", type=joint),), bounds, "standard", np.eye(4), tool)
+    rows = RecordedMotion(t, *states, None, None, None, None, Resolution(0.0, half, half, half), "rows")
+    joined = ("linear", "cubic", "quintic")[columns - 1] if asked else None
+    judgement = judge_motion(
+        lambda: (rows,), Requirements(robot, tool=lambda: ToolJudge(robot), interpolate=joined)
+    )
+    return judgement.verdict, [found for found in judgement.findings if found.kind == f"tool_{limit}"]
+
+
+@pytest.mark.parametrize(("joint", "limit"), OF_ARMS)
+@pytest.mark.parametrize("more", [0, 1])
+@pytest.mark.parametrize(("share", "over"), [(0.9, True), (1.1, False)])
+def test_dense_rows_that_state_too_much_are_over_the_limit(
+    share: float, more: int, limit: str, joint: str, *, over: bool
+) -> None:
+    """By the differences of their last column, or of the last but one; decimals make many times as much of the curve."""
+    name = limit.removeprefix("angular_")
+    columns = min(NEEDED[name] + more, 3)
+    t = np.arange(251) * 4e-3
+    verdict, found = swing(joint, limit, share, t, columns, 4)
+    assert (verdict == "exceeded") == over
+    for each in found if over else ():
+        assert (each.severity, each.certainty) == ("error", "exceeded")
+        assert abs(each.value - SIZES[name]) <= 0.03 * SIZES[name] + each.rounding
+        assert each.rounding < 0.2 * SIZES[name]
+        assert each.row == round(each.time / 4e-3 - 0.25) + 1
+
+
+@pytest.mark.parametrize(("joint", "limit"), OF_ARMS)
+@pytest.mark.parametrize(("share", "over"), [(0.9, True), (1.15, False)])
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_short_interval_of_sparse_rows_hides_nothing(
+    share: float, limit: str, joint: str, *, over: bool, asked: bool
+) -> None:
+    """A tenth of a millisecond makes of six decimals thousands of times what is allowed, and nothing of it certain."""
+    name = limit.removeprefix("angular_")
+    t = np.sort(np.append(np.arange(51) * 0.02, [0.3201, 0.8201]))
+    verdict, found = swing(joint, limit, share, t, 3, 6, asked=asked)
+    assert (verdict == "exceeded") == over
+    for each in found if over else ():
+        assert (each.severity, each.certainty) == ("error", "exceeded")
+        assert each.value == pytest.approx(SIZES[name], rel=0.1)
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_dense_rows_whose_curve_alone_is_over_a_limit_are_over_it_where_somebody_asked(
+    *, asked: bool
+) -> None:
+    """Beside a short interval that rounding explains: a step of acceleration between two rows, of which the quintic makes 1.12 m/s^2."""
+    t = np.sort(np.append(np.arange(51) * 4e-3, 0.0401))
+    since = np.maximum(t - 0.1212, 0.0)
+    states = [0.5 * since**2, since, (since > 0).astype(float)]
+    half = np.full(1, 0.5e-8)
+    rows = RecordedMotion(
+        t,
+        *(np.round(values, 8)[:, None] for values in states),
+        None,
+        None,
+        None,
+        None,
+        Resolution(0.0, half, half, half),
+        "rows",
+    )
+    limits = replace(unlimited(1), tcp=ToolLimits(acceleration=1.05))
+    robot = Robot("arm", (Joint("a", type="prismatic"),), limits, "standard", np.eye(4), np.eye(4))
+    joined = "quintic" if asked else None
+    judgement = judge_motion(
+        lambda: (rows,), Requirements(robot, tool=lambda: ToolJudge(robot), interpolate=joined)
+    )
+    found = [each for each in judgement.findings if each.kind == "tool_acceleration"]
+    assert [each.certainty == "exceeded" and each.severity == "error" for each in found] == [asked]
