@@ -126,6 +126,23 @@ def test_rest_of_positions_alone_in_either_direction(side: float, reverse: bool,
         assert (f"fr3-rest-{'start' if reverse else 'end'}" in found) == broken
 
 
+@SIDES
+@pytest.mark.parametrize(("joint", "jerk"), [(1, 3750.0), (6, 10000.0)])
+@pytest.mark.parametrize(("share", "broken"), [(0.98, False), (1.05, True)])
+@pytest.mark.parametrize("last", [1, 2, 3])
+def test_each_joint_brakes_to_rest_with_its_own_jerk_in_whatever_blocks_it_comes(
+    last: int, share: float, joint: int, jerk: float, side: float, *, broken: bool
+) -> None:
+    """A step of position before the last row but one is a second difference, of which a period of jerk leaves some."""
+    q = STILL.copy()
+    q[:-2, joint] += side * share * jerk * 1e-9
+    rows = replace(motion(rows=21, columns="q", decimals=None), q=q)
+    blocks = [part(rows, slice(0, 21 - last)), part(rows, slice(21 - last, None))]
+    found = judge_by_profile(blocks, load_profile("franka-fer"), Surroundings(rows.joints, q[0])).findings
+    rest = [each.joint for each in found if each.rule == "fer-rest-end"]
+    assert rest == [f"joint_{joint + 1}"] * broken
+
+
 @pytest.mark.parametrize(("row", "at"), [(0, "start"), (2, "start"), (-3, "end"), (-1, "end")])
 @pytest.mark.parametrize(("factor", "told"), [(1.0, True), (1.009, True), (2.0, False), (0.5, False)])
 def test_rest_of_positions_alone_is_judged_at_the_period_alone(

@@ -17,6 +17,7 @@ from planted_faults import (
     with_value,
 )
 
+from trajcli.consumers.judgement import judge_by_profile, load_profile
 from trajcli.consumers.rule_check import Surroundings
 from trajcli.kinematics.robot import Limits
 from trajcli.streams.recorded_motion import RecordedMotion
@@ -112,8 +113,8 @@ def test_of_segments_that_become_zero_the_shortest_is_named(shortest: int) -> No
 
 @pytest.mark.parametrize(
     ("named", "name"),
-    [(None, "q5"), (("a", "b"), "q5"), (tuple("abcdefg"), "e")],
-    ids=["none", "two", "seven"],
+    [(None, "q5"), (("a", "b"), "q5"), (tuple("abcdefg"), "e"), (tuple("abcdefgh"), "q5")],
+    ids=["none", "two", "seven", "eight"],
 )
 def test_joints_that_the_file_does_not_name_have_the_names_of_the_robot_or_numbers(
     named: tuple[str, ...] | None, name: str
@@ -265,15 +266,39 @@ def test_a_last_velocity_above_the_epsilon_of_float32() -> None:
     assert judged(with_value(CLEAN["ros-jtc"], "qd", -1, 3, 1.1e-7), "ros-jtc").findings == ()
 
 
+@pytest.mark.parametrize("columns", ["q,qd", "q,qd,qdd"])
+@pytest.mark.parametrize(("velocity", "taken"), [(1.19e-7, True), (1.195e-7, False)])
+def test_a_last_velocity_is_told_from_rest_by_the_epsilon_of_float32(
+    velocity: float, columns: str, *, taken: bool
+) -> None:
+    rows = with_value(motion(period=0.1, rows=21, columns=columns), "qd", -1, 3, -velocity)
+    assert [each.rule for each in judged(rows, "ros-jtc").findings] == ["jtc-last-velocity"] * (not taken)
+
+
+def test_names_of_a_message_are_judged_with_those_that_are_left_out() -> None:
+    """It names the joints in another order, and a gripper that the arm has not; joints have the names of their columns."""
+    rows = CLEAN["ros-jtc"]
+    names = rows.joints or ()
+    rows = with_value(replace(rows, message_joints=(*names[::-1], "gripper")), "qd", -1, 0, 1e-3)
+    found = {each.rule: each for each in judged(rows, "ros-jtc", surroundings(7)).findings}
+    assert found["jtc-joint-names"].message == "the robot has no joint 'gripper'"
+    assert found["jtc-joint-names"].joint is None
+    assert found["jtc-last-velocity"].joint == "joint_1"
+    same = replace(rows, message_joints=names[::-1])
+    (told,) = judged(same, "ros-jtc", surroundings(7)).findings
+    assert told.joint == "joint_1"
+
+
 def test_efforts_are_rejected() -> None:
     rows = replace(CLEAN["ros-jtc"], tau=np.zeros((21, 7)))
     breach = only(judged(rows, "ros-jtc"))
-    assert (breach.rule, breach.kind, breach.severity, breach.row, breach.count) == (
+    assert (breach.rule, breach.kind, breach.severity, breach.row, breach.count, breach.joint) == (
         "jtc-effort",
         "effort",
         "error",
         1,
         21,
+        None,
     )
 
 
@@ -634,6 +659,18 @@ def test_rounded_durations_move_the_curve() -> None:
         joint = int((breach.joint or "")[-1]) - 1
         assert breach.value == pytest.approx(off[:, joint].max(), abs=1e-6)  # and half a unit
         assert (breach.severity, breach.kind) == ("warning", "quantisation")
+
+
+def test_durations_below_a_millisecond_move_positions_alone_as_well() -> None:
+    """Each of 500.4 us is sent as 500 us: after k points all come 0.4 k us early."""
+    base = motion(6, 5.004e-4, 2001, decimals=None, columns="q")
+    early = np.arange(2001) * 4e-7
+    speeds = np.abs(np.diff(base.q, axis=0, prepend=base.q[:1])) / 5.004e-4
+    found = judge_by_profile([base], load_profile("ur-passthrough"), surroundings(6)).findings
+    told = {each.joint: each.value for each in found if each.rule == "passthrough-quantisation"}
+    largest = (speeds * early[:, None]).max(axis=0)
+    assert len(told) == 6
+    assert list(told.values()) == pytest.approx([largest[int(joint[-1]) - 1] for joint in told], abs=6e-7)
 
 
 def test_breaches_are_counted_by_move() -> None:
