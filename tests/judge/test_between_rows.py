@@ -349,7 +349,7 @@ def test_forces_of_other_joints_say_nothing_about_this_one(side: int) -> None:
 
 
 @pytest.mark.parametrize("side", SIDES)
-@pytest.mark.parametrize(("rounding", "severity"), [(1e-6, "error"), (2e-4, "warning")])
+@pytest.mark.parametrize(("rounding", "severity"), [(1e-6, "error"), (2.4e-4, "error"), (2.6e-4, "warning")])
 def test_a_force_that_rows_have_but_for_their_rounding_is_one_of_the_curve_alone(
     rounding: float, severity: str, side: int
 ) -> None:

@@ -268,3 +268,41 @@ def test_rows_are_dense_or_not_where_the_force_is(dense_first: bool, side: int) 
         (found,) = [each for each in judgement.findings if each.kind == "effort"]
         assert found.severity == ("error" if length > 0.01 else "warning")
         assert found.row == fast + 1
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("columns", [2, 3])
+@pytest.mark.parametrize("decimals", [3, 4])
+@pytest.mark.parametrize("asked", [True, False])
+@pytest.mark.parametrize(("beyond", "verdict"), [(0.05, "exceeded"), (-0.01, "")])
+def test_rows_that_state_more_than_the_way_to_the_end_allows_are_certain_whatever_their_decimals_are(
+    beyond: float, verdict: str, decimals: int, columns: int, side: int, *, asked: bool
+) -> None:
+    """At 0.6 rad/s up to where sqrt(12 x) - 0.3 is so much less; positions a millisecond apart tell 0.1 or 1 rad/s."""
+    speed, start, left = 0.6, 0.2, (0.6 - beyond + 0.3) ** 2 / 12
+    t = 1e-3 * np.arange(int((start - left) / speed * 1e3) + 1)
+    q, qd = side * (1.0 - start + speed * t), np.full(t.size, side * speed)
+    half = np.full(1, 0.5 * 10.0**-decimals)
+    stated = [np.round(values, decimals)[:, None] for values in (q, qd, 0.0 * t)[:columns]]
+    rows = RecordedMotion(
+        t,
+        *[*stated, None][:3],
+        None,
+        None,
+        None,
+        None,
+        Resolution(0.0, half, half, half),
+        "rows",
+    )
+    limits = replace(
+        unlimited(1), position=np.array([[-1.0, 1.0]]), velocity_by_position=np.array([[6.0, 0.3]])
+    )
+    joined = ("cubic" if columns == 2 else "quintic") if asked else None
+    judged = judge_motion(lambda: [rows], Requirements(bare_robot(limits), interpolate=joined))
+    (told,) = [each for each in judged.findings if each.kind == "velocity_by_position"] or [None]
+    assert (judged.verdict == "exceeded") == (verdict == "exceeded")
+    if verdict and told is not None:
+        assert (told.value, told.certainty) == (pytest.approx(side * speed), "exceeded")
+        assert told.time == pytest.approx(t[-1], abs=3e-3)
+        assert abs(told.limit) == pytest.approx(speed - beyond, abs=0.01)
+        assert told.factor == pytest.approx(told.value / told.limit)

@@ -260,12 +260,17 @@ def _add_approaches(
 ) -> None:
     """Add those of pieces of one degree, which determine derivatives up to a level."""
     window, fast = run.window, _fast_approaches(run, found, at)
-    certain, warned = fast.certain, np.zeros(fast.joint.size, dtype=bool)
+    by_curve, rounding = fast.certain, fast.rounding
+    excess, warned = np.abs(fast.speed) - np.abs(fast.bound), np.zeros_like(fast.certain)
     if not run.asked:
         explained = explained_by_law(window, fast.piece, fast.joint, 1, level)
-        warned = certain & (np.abs(fast.speed) - np.abs(fast.bound) <= explained + fast.rounding)
-        for end in (np.zeros_like(fast.local), window.lengths[fast.piece]):
-            warned &= ~_fast_approaches(run, found, (end, fast.used)).certain
+        warned = by_curve & (excess <= explained + rounding)
+    for end in (np.zeros_like(fast.local), window.lengths[fast.piece]):
+        stated = _fast_approaches(run, found, (end, fast.used), of_rows=True)
+        warned &= ~stated.certain
+        worse = ~fast.certain | (stated.used > fast.used)
+        fast = fast.replaced(stated, stated.certain & ~by_curve & worse)
+    certain = fast.certain
     make = partial(fast.finding, run)
     found_at = fast.piece, fast.joint
     run.add("velocity_by_position", found_at, fast.used, make, certain, warned)
@@ -301,6 +306,11 @@ class _FastApproaches:
         towards = np.where(np.signbit(self.bound), -self.speed, self.speed)
         return np.asarray(towards - np.abs(self.bound) > self.rounding)
 
+    def replaced(self, other: _FastApproaches, where: NDArray[np.bool_]) -> _FastApproaches:
+        """Return the same with those of others in some places."""
+        every = {name: np.where(where, getattr(other, name), own) for name, own in vars(self).items()}
+        return _FastApproaches(**every)
+
     def finding(self, run: JudgedRun, k: int) -> Finding:
         from trajcli.curves.approach import ApproachUse
         from trajcli.limits.velocity_by_position import approach_excess
@@ -313,9 +323,12 @@ class _FastApproaches:
 
 
 def _fast_approaches(
-    run: JudgedRun, found: tuple[NDArray[np.intp], ...], at: tuple[Array, Array]
+    run: JudgedRun, found: tuple[NDArray[np.intp], ...], at: tuple[Array, Array], *, of_rows: bool = False
 ) -> _FastApproaches:
-    """Return the states in which limits are used most, from indices of uses, their times and sizes."""
+    """Return the states in which limits are used most, from indices of uses, their times and sizes.
+
+    With `of_rows` these are rows, whose own rounding counts where they state velocities.
+    """
     from trajcli.curves.approach import ROOM, allowed_speed
 
     window, pieces, limits = run.window, run.pieces, run.robot.limits
@@ -328,8 +341,13 @@ def _fast_approaches(
     low, high = limits.position[joint].T
     distance = np.where(upwards, high - position, position - low)
     d, o = limits.approach.deceleration[joint], limits.approach.offset[joint]
-    bound, roomy = (allowed_speed(distance + more, d, o) - ROOM for more in (0.0, rows.error(0)))
+    own = of_rows and len(rows.ends) > 1 and not rows.spline
+    errors = rows.errors[:2] if own else (rows.error(0), rows.error(1))
+    bound, roomy = (allowed_speed(distance + more, d, o) - ROOM for more in (0.0, errors[0]))
     bound = np.where(bound > ROOM, bound, 0.0)
     sign = np.where(upwards, 1.0, -1.0)
-    rounding = rows.error(1) + np.maximum(roomy - bound, 0.0)
+    rounding = errors[1] + np.maximum(roomy - bound, 0.0)
+    if of_rows:
+        with np.errstate(divide="ignore"):
+            used = np.abs(speed) / bound
     return _FastApproaches(piece, joint, local, distance, speed, sign * bound, rounding, used)
