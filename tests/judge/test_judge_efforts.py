@@ -212,7 +212,8 @@ def swing(
     rows = np.column_stack([t, *(largest * values for values in states)])[:, : columns + 1]
     names = ["t", "q1", "qd1", "qdd1"][: columns + 1]
     np.savetxt(folder / "rows.csv", rows, f"%.{decimals}f", ",", header=",".join(names), comments="")
-    judged = check_file(str(folder / "rows.csv"), CheckOptions(robot=str(folder / "arm.yaml"))).judgement
+    options = CheckOptions(robot=str(folder / "arm.yaml"))
+    judged = check_file(str(folder / "rows.csv"), options).judgement
     return judged.verdict, [each for each in judged.findings if each.kind == "effort"]
 
 
@@ -252,3 +253,26 @@ def test_what_dense_rows_state_is_over_a_limit_whatever_their_decimals_make_of_t
         assert each.row == round(each.time / 4e-3 - 0.01) + 1
         assert each.time == pytest.approx(0.5 - 0.25 * side, abs=0.03)
         assert each.method == ("sampled" if decimals == 4 else each.method)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("columns", "joined"), [(1, "jtc-upsampling"), (3, "jtc-upsampling"), (3, "jtc")])
+@pytest.mark.parametrize(("share", "over"), [(0.9, True), (1.1, False)])
+def test_torques_of_controllers_that_join_rows_in_their_own_ways(
+    share: float, columns: int, joined: str, side: int, tmp_path: Path, *, over: bool
+) -> None:
+    """A swing from rest to rest, 9 rad/s^2 at its ends; of a spline through positions rows state no torque."""
+    (tmp_path / "arm.yaml").write_text(
+        f"name: arm\nconvention: standard\njoints:\n  - {{a: 1, effort: {share * 0.33 * 9.0}, "
+        "link: {mass: 1, com: [-0.5, 0, 0], inertia: [0.08, 0.08, 0.08, 0, 0, 0]}}\n"
+    )
+    t, w = np.arange(101) * 0.01, 2 * np.pi
+    states = [(1 - np.cos(w * t)) / w**2, np.sin(w * t) / w, np.cos(w * t)]
+    rows = np.column_stack([t, *(side * 9.0 * values for values in states)])[:, : columns + 1]
+    header = "t,q1,qd1,qdd1"[: 4 + 4 * (columns > 1) + 5 * (columns > 2)]
+    np.savetxt(tmp_path / "rows.csv", rows, "%.9f", ",", header=header, comments="")
+    options = CheckOptions(robot=str(tmp_path / "arm.yaml"), interpolate=joined)
+    judged = check_file(str(tmp_path / "rows.csv"), options).judgement
+    assert judged.verdict == ("exceeded" if over else "satisfied")
+    for each in judged.findings:
+        assert (each.kind, abs(each.value)) == ("effort", pytest.approx(0.33 * 9.0, rel=0.02))

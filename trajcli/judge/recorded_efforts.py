@@ -218,7 +218,7 @@ class _EffortJudge:
     @cached_property
     def _stated(self) -> _States:
         """What rows state on the curved pieces; at rest friction is that of the motion beside."""
-        still, lengths = _still(self.run.window), self._lengths
+        still, lengths, count = _still(self.run.window), self._lengths, len(self.dynamics.links)
         parts = [
             (chosen, np.full(chosen.size, share) * lengths[chosen], *state)
             for chosen, rows in self.run.window.rows_by_level(self.curved)
@@ -227,7 +227,9 @@ class _EffortJudge:
         at = np.concatenate([np.empty(0, dtype=np.intp), *(part[0] for part in parts)])
         local = np.concatenate([np.empty(0), *(part[1] for part in parts)])
         values, errors = (
-            np.concatenate([np.empty((3, 0)), *(part[k] for part in parts)], axis=1).reshape(3, at.size, -1)
+            np.concatenate([np.empty((3, 0)), *(part[k] for part in parts)], axis=1).reshape(
+                3, at.size, count
+            )
             for k in (2, 3)
         )
         slopes = derivative_coefficients(self.run.window.coefficients[:, self.curved[at]], 1)
