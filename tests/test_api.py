@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import trajcli
 from tests.cli.running import run
-from trajcli.api.plans import _is_yaml
+from trajcli.api.plans import is_yaml
 from trajcli.streams.reading import read_table
 
 ROOT = Path(__file__).parents[1]
@@ -52,10 +52,10 @@ def test_a_path_a_text_a_mapping_and_a_read_job_give_the_same_plan(tmp_path: Pat
 
 
 def test_a_flow_mapping_is_a_text_and_a_name_is_a_path() -> None:
-    assert _is_yaml("{version: 1}")
-    assert _is_yaml("version: 1")
-    assert not _is_yaml("folder/job.yaml")
-    assert not _is_yaml("C:/folder/job.yaml")
+    assert is_yaml("{version: 1}")
+    assert is_yaml("version: 1")
+    assert not is_yaml("folder/job.yaml")
+    assert not is_yaml("C:/folder/job.yaml")
     with pytest.raises(trajcli.FileError, match=r"nowhere\.yaml"):
         trajcli.plan("nowhere.yaml")
 
@@ -303,3 +303,78 @@ def test_words_that_mean_nothing_are_refused(tmp_path: Path) -> None:
 def test_a_robot_that_is_no_name_is_wrong_input(name: object) -> None:
     with pytest.raises(trajcli.InputError, match="the catalogue has no robot"):
         trajcli.load_robot(name)  # type: ignore[arg-type]
+
+
+def test_what_is_no_array_of_numbers_is_wrong_input() -> None:
+    robot, words = trajcli.load_robot("ur5e"), ["a"] * 6
+    pose, trajectory = robot.fk([0.3] * 6), trajcli.plan(CUBIC).trajectory
+    for call, message in (
+        (lambda: robot.fk(words), "q: expected an array of numbers, got <U1"),
+        (lambda: robot.ik(pose, words), "near: expected an array of numbers, got <U1"),
+        (lambda: robot.ik(pose, np.zeros((2, 6))), "near: expected the values of 6 joints, got shape (2, 6)"),
+        (lambda: robot.ik("pose"), "pose: expected an array of numbers"),
+        (lambda: trajectory("now"), "t: expected an array of numbers"),
+        (
+            lambda: trajcli.check([0, 1], [[0, 1], [0]]),
+            "q: expected an array of numbers, got rows of several",
+        ),
+        (lambda: trajcli.check([0, 1], [0, 1]), "q: expected shape (N, n), a row for each time"),
+    ):
+        with pytest.raises(trajcli.InputError, match=re.escape(message)):
+            call()
+
+
+def test_arguments_that_mean_nothing_are_refused(tmp_path: Path) -> None:
+    job, table = EXAMPLES / "cubic.yaml", tmp_path / "rows.csv"
+    table.write_text("t,q1\n0,0\n1,0\n")
+    vary, page = {"moves.0.duration": [1]}, tmp_path / "page.html"
+    endless: dict[str, object] = {}
+    endless["moves"] = [endless]
+    for call, message in (
+        (lambda: trajcli.sweep(job, vary, processes=0), "processes: expected 1 to 1024, got 0"),
+        (lambda: trajcli.sweep(job, vary, timeout=-1), "timeout: expected seconds above 0, or None for ever"),
+        (lambda: trajcli.batch(job, timeout=float("nan")), "timeout: expected seconds above 0"),
+        (lambda: trajcli.batch([]), "there is no job in an empty list"),
+        (lambda: trajcli.batch(job, form="xyz"), "rows are written in no format 'xyz'"),  # type: ignore[arg-type]
+        (lambda: trajcli.view(job, page, robot="ur5e"), "robot: it is for files of rows"),
+        (lambda: trajcli.view(job, page, meshes=-1), "meshes: expected megabytes, 0 at least, got -1"),
+        (lambda: trajcli.resample(table, "100"), "rate: expected rows per second above 0"),  # type: ignore[arg-type]
+        (lambda: trajcli.plan({"moves": endless}), "more than 100 levels deep"),
+    ):
+        with pytest.raises(trajcli.InputError, match=re.escape(message)):
+            call()
+    assert [*tmp_path.iterdir()] == [table]
+
+
+def test_one_name_serves_where_several_may_stand(tmp_path: Path) -> None:
+    job = tmp_path / "job.yaml"
+    job.write_bytes((EXAMPLES / "cubic.yaml").read_bytes())
+    assert [outcome.outcome for outcome in trajcli.batch(str(job), processes=1)] == ["written"]
+    trajcli.plot(job, tmp_path / "one.svg", over=tmp_path / "job.csv", quantities="q,qd", joints="j1")
+    trajcli.plot(
+        job, tmp_path / "two.svg", over=[tmp_path / "job.csv"], quantities=["q", "qd"], joints=["j1"]
+    )
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
+
+
+def test_the_text_of_a_job_in_one_line_is_a_job_everywhere(tmp_path: Path) -> None:
+    text = "{version: 1, robot: {joints: 1}, start: {joints: 0}, moves: [{planner: cubic, to: {joints: 1}, duration: 1}]}"
+    assert trajcli.plan(text).verdict.passed
+    trajcli.plot(text, tmp_path / "job.svg")
+    trajcli.view(text, tmp_path / "job.html")
+    table = trajcli.sweep(text, {"moves.0.duration": [1, 2]}, processes=1)
+    assert [row.point.verdict for row in table.rows] == ["verified", "verified"]
+
+
+def test_files_are_judged_in_pages_and_pictures_as_the_commands_do(tmp_path: Path) -> None:
+    job, rows = tmp_path / "job.yaml", tmp_path / "rows.csv"
+    job.write_text(TEXT + "limits: {velocity: 100}\n")
+    rows.write_text("t,q1_deg\n0,20\n0.01,50\n")
+    for beside, arm in ((None, job), (job, None)):
+        trajcli.view(rows, tmp_path / "page.html", beside=beside, robot=arm)
+        page = (tmp_path / "page.html").read_text()
+        assert "not judged" not in page
+        assert '"state":"violated"' in page
+    trajcli.plot(job, tmp_path / "marked.svg", over=rows)
+    run("plot", str(job), str(rows), "-o", str(tmp_path / "by_command.svg"))
+    assert (tmp_path / "marked.svg").read_bytes() == (tmp_path / "by_command.svg").read_bytes()

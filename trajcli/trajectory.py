@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, read_only
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, numeric, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import AT_BREAK, UniformGrid, onto_breaks
@@ -312,9 +312,9 @@ class Trajectory:
             order: 0 for positions, 1 velocities, 2 accelerations, and so on.
 
         Raises:
-            InputError: When a time lies outside the trajectory, or the order is none.
+            InputError: When a time is no number or outside the trajectory, or the order is none.
         """
-        times = np.asarray(t, dtype=np.float64)
+        times = np.asarray(numeric(t, "t"), dtype=np.float64)
         if isinstance(order, bool) or not isinstance(order, int) or order < 0:
             raise InputError(f"the order of the derivative is {order!r}, expected 0, 1, 2 or more")
         local = np.atleast_1d(times).reshape(-1) - self.start_time

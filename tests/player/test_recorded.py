@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trajcli.cli.check import judged_file
 from trajcli.judge.file import CheckOptions
+from trajcli.output.delivery.delivered import judged_file
 from trajcli.player.recorded import scene_of_file
 from trajcli.streams.byte_source import ByteSource
 

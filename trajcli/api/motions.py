@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from functools import partial
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from trajcli.api.plans import is_yaml
 from trajcli.api.plans import plan as planned_job
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.errors import InputError, TrajcliError, VerificationError
 from trajcli.frozen import frozen
 from trajcli.planning.plan import Plan
+from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion
 from trajcli.streams.whole_file import whole_file
 
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
     from trajcli.streams.formats import FormatName
 
 JobSource = str | Path | Mapping[str, Any] | Plan
+Several = str | Path | Sequence[str | Path]
 
 
 @frozen
@@ -150,8 +154,7 @@ def resample(file: str | Path, rate: float, *, output: str | Path | None = None)
     from trajcli.editing.operations import resample as resampled
     from trajcli.units import Units
 
-    if not (np.isfinite(rate) and rate > 0):
-        raise InputError(f"rate: expected rows per second above 0, got {rate}")
+    _require_positive("rate", rate, "rows per second above 0")
     before = read_motion(str(file), ReadingOptions(), declared=Units())
     return _continuous(before, Motion(resampled(before, float(rate))), output)
 
@@ -172,16 +175,16 @@ def plot(
     source: JobSource,
     output: str | Path,
     *,
-    over: Sequence[str | Path] = (),
-    quantities: Sequence[str] | None = None,
-    joints: Sequence[str] = (),
+    over: Several = (),
+    quantities: str | Sequence[str] | None = None,
+    joints: str | Sequence[str] = (),
 ) -> None:
     """Draw a job, a plan or a file of rows, as `trajcli plot` does.
 
     Args:
         source: A plan, a job as `trajcli.plan` takes it, or the path of a file of rows.
         output: An SVG, PNG or PDF file; it appears whole or not at all.
-        over: Files of rows that are drawn over it.
+        over: Files of rows that are drawn over it; over a job, what is wrong with them is marked.
         quantities: Of q, qd, qdd, qddd, tau, tool, path, phase; those that suit where left out.
         joints: Names of the joints to show; all where left out.
 
@@ -190,6 +193,8 @@ def plot(
         PlanningError: When a move has no curve.
         FileError: When a file cannot be read or written.
     """
+    from trajcli.judge.file import CheckOptions
+    from trajcli.output.delivery.delivered import judged_file
     from trajcli.plots.choice import parse_quantities
     from trajcli.plots.picture import picture_of
     from trajcli.plots.write import format_of_picture, rendered
@@ -197,12 +202,15 @@ def plot(
 
     kind = format_of_picture(str(output), None)
     plan = None if _is_motion(source) else _plan_of(source)
-    files = [*([str(source)] if plan is None else []), *map(str, over)]
-    wanted = None if quantities is None else parse_quantities(",".join(quantities))
+    files = [*([str(source)] if plan is None else []), *_listed(over)]
+    wanted = None if quantities is None else parse_quantities(",".join(_listed(quantities)))
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
         known = None if plan is None else plan.loaded.robot.joint_names
-        tables = [read_table(name, joints=known) for name in files]
-        picture = picture_of(plan, tables, wanted, tuple(joints))
+        sources = [ByteSource(name) for name in files]
+        tables = [read_table(each, joints=known) for each in sources]
+        judged = [] if plan is None else [judged_file(each, CheckOptions(), plan) for each in sources]
+        judgements = [None if isinstance(each, str) else each.judgement for each in judged]
+        picture = picture_of(plan, tables, wanted, tuple(_listed(joints)), judgements)
         content = rendered(picture, kind)
     with whole_file(str(output)) as out:
         out.write(content)
@@ -223,7 +231,8 @@ def view(
         source: A plan, a job as `trajcli.plan` takes it, or the path of a file of rows.
         output: An HTML file; it appears whole or not at all.
         beside: A second motion, to be played beside the first; as `source`.
-        robot: The arm that files of rows move: a name, a robot file, or a job.
+        robot: The arm that files of rows move, and by whose limits they are judged: a name, a robot file, or
+            a job; left out, the job that is shown beside one.
         compress: Whether script and data are packed.
         meshes: How long the visual meshes of a URDF may be, MB; with 0 none are drawn.
 
@@ -235,30 +244,49 @@ def view(
     from trajcli.player.page import check_page_name, page_of
 
     check_page_name(str(output))
-    scene = _scene_of(source, robot, meshes)
+    if not (_is_finite(meshes) and meshes >= 0):
+        raise InputError(f"meshes: expected megabytes, 0 at least, got {meshes!r}")
+    shown = (source,) if beside is None else (source, beside)
+    arm = _arm_of(shown, None if robot is None else str(robot))
+    scenes = [_scene_of(motion, arm, meshes) for motion in shown]
+    scene = scenes[0]
     if beside is not None:
         from trajcli.player.scene import scene_of_two
 
-        scene = scene_of_two(scene, _scene_of(beside, robot, meshes))
+        scene = scene_of_two(*scenes)
     page = page_of(scene, compress=compress)
     with whole_file(str(output)) as out:
         out.write(page)
 
 
-def _scene_of(source: JobSource, robot: str | Path | None, meshes: float) -> dict[str, Any]:
+def _arm_of(shown: Sequence[JobSource], robot: str | None) -> str | None:
+    """Return by what files of rows are judged: the robot that is named, else the file of the first job."""
+    jobs = [source for source in shown if not _is_motion(source)]
+    if robot is not None:
+        if len(jobs) == len(shown):
+            raise InputError("robot: it is for files of rows, and a job names its own", hint="leave it out")
+        return robot
+    files = (str(job) for job in jobs if isinstance(job, Path) or (isinstance(job, str) and not is_yaml(job)))
+    return next(files, None)
+
+
+def _scene_of(source: JobSource, arm: str | None, meshes: float) -> dict[str, Any]:
     """Return what the page shows of a plan, a job, or a file of rows."""
     with np.errstate(all="ignore"):
         if _is_motion(source):
+            from trajcli.output.delivery.delivered import judged_by
             from trajcli.player.recorded import scene_of_file
 
-            return scene_of_file(str(source), None if robot is None else str(robot), meshes=meshes)
+            opened = ByteSource(str(source))
+            checked = None if arm is None else judged_by(opened, arm)
+            return scene_of_file(opened, arm, checked, meshes)
         from trajcli.player.scene import scene_of_plan
 
         return scene_of_plan(_plan_of(source), meshes)
 
 
 def batch(
-    jobs: Sequence[str | Path],
+    jobs: Several,
     output: str | Path | None = None,
     *,
     form: FormatName = "csv",
@@ -285,22 +313,21 @@ def batch(
         strict: Whether events fail a job.
 
     Raises:
-        InputError: When there is no job, or two have one output.
+        InputError: When there is no job, or two have one output; or an argument means nothing.
         FileError: When a folder cannot be read.
     """
     from trajcli.batches.jobs import Ledgers, find_jobs
-    from trajcli.batches.processes import run_in_processes, usable_cores
+    from trajcli.batches.processes import run_in_processes
     from trajcli.batches.task import BatchSetup, Task
 
-    if processes is not None and processes < 1:
-        raise InputError(f"processes: expected 1 at least, got {processes}")
-    found = find_jobs([str(job) for job in jobs], None if output is None else str(output), form)
+    most = _processes(processes, timeout)
+    found = find_jobs(_listed(jobs), None if output is None else str(output), form)
     ledgers = Ledgers(found.jobs)
     known = {} if force else ledgers.known()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
     setup = BatchSetup(form, found.owners(), rows, consumer, strict)
     outcomes: list[JobOutcome] = []
-    count = min(processes or usable_cores(), len(tasks))
+    count = min(most, len(tasks))
     try:
         with closing(run_in_processes(tasks, setup, count, timeout, lambda: None)) as done:
             for outcome in done:
@@ -340,18 +367,19 @@ def sweep(
         force: Whether points that are known are planned again.
 
     Raises:
-        InputError: When a path leads nowhere, or there are too many points.
+        InputError: When a path leads nowhere, there are too many points, or an argument means nothing.
         FileError: When the job cannot be read, or the table not written.
         TrajcliError: When a process that planned a point has crashed.
     """
-    from trajcli.batches.processes import run_in_processes, usable_cores
+    from trajcli.batches.processes import run_in_processes
     from trajcli.batches.sweep import PointLedger, axis_of, outcomes_of, parse_axis, sweep_of
     from trajcli.batches.sweep_table import SweepRow, SweepTable, form_of_table
     from trajcli.job.dump import mapping_text
     from trajcli.job.yaml.source import read_bytes
 
-    if isinstance(job, Mapping) or "\n" in str(job):
-        file, content = "<text>", (mapping_text(job) if isinstance(job, Mapping) else str(job)).encode()
+    most = _processes(processes, timeout)
+    if isinstance(job, Mapping) or (isinstance(job, str) and is_yaml(job)):
+        file, content = "<text>", (mapping_text(job) if isinstance(job, Mapping) else job).encode()
     else:
         file, content = str(job), read_bytes(str(job))
     axes = [
@@ -362,7 +390,7 @@ def sweep(
     table = None if output is None else str(output)
     if table is not None:
         form_of_table(table)
-    count = min(processes or usable_cores(), len(swept.rows))
+    count = min(most, len(swept.rows))
     ledger = PointLedger(table, force=force)
     rows = dict[int, SweepRow]()
     run = partial(run_in_processes, count=count, timeout=timeout)
@@ -379,8 +407,37 @@ def sweep(
 
 def _is_motion(source: JobSource) -> bool:
     """Return whether a source is a file of rows, and no job."""
-    return isinstance(source, str | Path) and "\n" not in str(source) and holds_motion(str(source))
+    if isinstance(source, str) and is_yaml(source):
+        return False
+    return isinstance(source, str | Path) and holds_motion(str(source))
 
 
 def _plan_of(source: JobSource) -> Plan:
     return source if isinstance(source, Plan) else planned_job(source)
+
+
+def _listed(names: Several) -> list[str]:
+    """Return what is one name or several of them."""
+    return [str(names)] if isinstance(names, str | Path) else [str(name) for name in names]
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, Real) and bool(np.isfinite(float(value)))
+
+
+def _require_positive(name: str, value: float, expected: str) -> None:
+    if not (_is_finite(value) and value > 0):
+        raise InputError(f"{name}: expected {expected}, got {value!r}")
+
+
+def _processes(asked: int | None, timeout: float | None) -> int:
+    """Return how many processes there are at most, where that many and their time mean something."""
+    from trajcli.batches.processes import MOST_PROCESSES, usable_cores
+
+    if timeout is not None:
+        _require_positive("timeout", timeout, "seconds above 0, or None for ever")
+    if asked is None:
+        return usable_cores()
+    if not isinstance(asked, int) or not 1 <= asked <= MOST_PROCESSES:
+        raise InputError(f"processes: expected 1 to {MOST_PROCESSES}, got {asked!r}")
+    return asked

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, numeric
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob, job_from_text, load_job
@@ -138,12 +138,14 @@ class Arm(Robot):
             tolerance: What an answer may miss the pose by, m and rad.
 
         Raises:
-            InputError: When the robot has no geometry, or the pose is none.
+            InputError: When the robot has no geometry, the pose is none, or `near` is no configuration.
         """
         from trajcli.kinematics.inverse.solve import solve
         from trajcli.kinematics.inverse.target import pose_target
 
-        aim = np.zeros(len(self.joints)) if near is None else np.asarray(near, dtype=np.float64)
+        aim = np.zeros(len(self.joints)) if near is None else np.asarray(numeric(near, "near"), np.float64)
+        if aim.ndim != 1:
+            raise InputError(f"near: expected the values of {len(self.joints)} joints, got shape {aim.shape}")
         solutions = solve(self, pose_target(_pose(pose)), aim, tolerance)
         usable = np.flatnonzero(solutions.valid if every else solutions.within_limits)
         usable = usable[np.argsort(np.abs(solutions.joints[usable] - aim).max(axis=-1), kind="stable")]
@@ -242,7 +244,7 @@ def load_robot(name: str | Path) -> Arm:
 
 
 def _loaded(job: str | Path | Mapping[str, Any] | LoadedJob, overrides: Sequence[str]) -> LoadedJob:
-    if isinstance(job, Path) or (isinstance(job, str) and not _is_yaml(job)):
+    if isinstance(job, Path) or (isinstance(job, str) and not is_yaml(job)):
         return load_job(job, overrides)
     if overrides:
         raise InputError("overrides are for job files", hint="change the text or the mapping itself")
@@ -260,7 +262,7 @@ def _loaded(job: str | Path | Mapping[str, Any] | LoadedJob, overrides: Sequence
     )
 
 
-def _is_yaml(text: str) -> bool:
+def is_yaml(text: str) -> bool:
     """Return whether a text is a job itself, and not the path of one: a name has no line and no mapping."""
     return "\n" in text or text.lstrip().startswith("{") or ": " in text
 
@@ -270,6 +272,6 @@ def _pose(value: ArrayLike) -> Array:
     from trajcli.geometry.pose import build, check_pose
     from trajcli.geometry.rotation import nearest_rotation
 
-    pose = np.array(value, dtype=np.float64)
+    pose = np.array(numeric(value, "pose"), dtype=np.float64)
     exact = check_pose(pose) <= _EXACT
     return pose if exact else build(nearest_rotation(pose[:3, :3]), pose[:3, 3])

@@ -59,10 +59,13 @@ def find_jobs(names: Sequence[str], folder: str | None, form: FormatName) -> Bat
         form: Of the rows; it says the ending of their files.
 
     Raises:
-        InputError: When there is no job, or two things would be in one file.
+        InputError: When there is no job or no such format, or two things would be in one file.
         FileError: When a folder cannot be read.
     """
-    ending = next(ending for ending, known in ENDINGS.items() if form in known)
+    ending = next((ending for ending, known in ENDINGS.items() if form in known), None)
+    if ending is None:
+        formats = dict.fromkeys(name for known in ENDINGS.values() for name in known)
+        raise InputError(f"rows are written in no format {form!r}", hint=f"formats: {', '.join(formats)}")
     jobs: list[BatchJob] = []
     no_jobs: list[str] = []
     for name in names:
@@ -80,7 +83,8 @@ def find_jobs(names: Sequence[str], folder: str | None, form: FormatName) -> Bat
                 no_jobs.append(str(path))
     if not jobs:
         raise InputError(
-            f"there is no job in {', '.join(names)}", hint="a job has the keys version and moves"
+            f"there is no job in {', '.join(names) or 'an empty list'}",
+            hint="a job has the keys version and moves",
         )
     _check_files_differ(jobs)
     return BatchJobs(tuple(jobs), tuple(no_jobs))

@@ -18,6 +18,7 @@ from trajcli.batches.task import BUG, JobOutcome, Setup, Task, run_task
 from trajcli.errors import PlanningError, Problem
 from trajcli.streams.whole_file import remove_unfinished
 
+MOST_PROCESSES = 1024
 _TICK = 0.2  # s between two looks at the clock
 _GRACE = 2.0  # s for a process to remove what is half written, before it is killed
 

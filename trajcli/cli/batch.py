@@ -79,7 +79,7 @@ def outcomes_of_tasks(
 
 def processes_of(options: BatchCommand | SweepCommand) -> int:
     """Return how many processes there are at most."""
-    from trajcli.batches.processes import usable_cores
+    from trajcli.batches.processes import MOST_PROCESSES, usable_cores
 
     given = {"-j": options.count, "--timeout": options.timeout}
     for name in (name for name, value in given.items() if value is not None and options.engine == "dask"):
@@ -88,8 +88,8 @@ def processes_of(options: BatchCommand | SweepCommand) -> int:
         raise InputError("--scheduler is about a cluster", hint="add --engine dask")
     if options.count is None:
         return usable_cores()
-    if not re.fullmatch("[0-9]{1,4}", options.count) or not 1 <= int(options.count) <= 1024:
-        raise InputError(f"-j expects 1 to 1024 processes, got '{options.count}'")
+    if not re.fullmatch("[0-9]{1,4}", options.count) or not 1 <= int(options.count) <= MOST_PROCESSES:
+        raise InputError(f"-j expects 1 to {MOST_PROCESSES} processes, got '{options.count}'")
     return int(options.count)
 
 

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from trajcli.cli.numbers import number
 from trajcli.cli.outcome import error_as_json, print_json, print_lines, print_remark, print_text, report_error
 from trajcli.cli.terminal import shown_table
@@ -17,15 +15,13 @@ from trajcli.findings import Finding
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.output.annotations import annotations_of, render_annotations
+from trajcli.output.delivery.delivered import delivered_as
 from trajcli.streams.reading import motion_files
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
     from trajcli.cli.job_commands import CheckCommand
-    from trajcli.job.read import LoadedJob
     from trajcli.peers.motion_reference import MotionReference
-    from trajcli.planning.plan import Plan
-    from trajcli.streams.byte_source import ByteSource
 
 
 _MOST, _FEW = 30, 4  # findings that a table lists: of those that are certain, and of each other group
@@ -37,15 +33,6 @@ _JOINED = {
     "jtc": "joined as the joint_trajectory_controller does",
     "jtc-upsampling": "joined by the spline of the joint_trajectory_controller",
 }
-
-
-def _delivered(loaded: LoadedJob, profile: str | None, form: str) -> Plan:
-    """Return the plan of a job for a consumer, as it is written in a format."""
-    from trajcli.output.delivery.delivered import delivered
-    from trajcli.streams.formats import DEFAULT, FORMATS
-
-    named = {"fields": "npz"}.get(form, form)
-    return delivered(loaded, profile, next((FORMATS[name] for name in FORMATS if name == named), DEFAULT))[0]
 
 
 def run_check(options: CheckCommand) -> int:
@@ -100,7 +87,7 @@ def _form(
 
 
 def _checked_file(file: str, options: CheckCommand) -> tuple[CheckedFile, MotionReference | None]:
-    checked = check_file(file, options.part(CheckOptions), delivered=_delivered)
+    checked = check_file(file, options.part(CheckOptions), delivered=delivered_as)
     if not options.reference:
         return checked, None
     from trajcli.peers.motion_reference import compared
@@ -228,21 +215,6 @@ def _annotations(checked: CheckedFile, file: str) -> Iterator[Problem]:
 
 
 _RULES = ("limit", "continuity", "time", "derivative", "state", "path")
-
-
-def judged_file(source: ByteSource, options: CheckOptions, plan: Plan | None = None) -> CheckedFile | str:
-    """Return the judgement of a file; why there is none where nothing of it can be judged.
-
-    Args:
-        source: The file.
-        options: What it is judged by.
-        plan: Of a job that was planned before.
-    """
-    try:
-        with np.errstate(all="ignore"):  # what is not finite is for the judge to find
-            return check_file(source, options, plan)
-    except TrajcliError as error:
-        return error.problems[0].text()
 
 
 def problems_of(checked: CheckedFile, *, every: bool) -> Iterator[Problem]:

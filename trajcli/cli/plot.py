@@ -14,7 +14,7 @@ from trajcli.cli.outcome import print_remark
 from trajcli.cli.progress import progress
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.job.read import files_of, load_job
-from trajcli.output.delivery.delivered import plan_of
+from trajcli.output.delivery.delivered import judged_file, plan_of
 from trajcli.planning.plan import Plan
 from trajcli.plots.choice import parse_quantities, split_names
 from trajcli.plots.picture import picture_of
@@ -70,7 +70,6 @@ def _checked_files(
     """Return the judgement of each file by the job; None, with a remark, where it cannot be judged."""
     if not sources:
         return []
-    from trajcli.cli.check import judged_file
     from trajcli.judge.file import CheckOptions
 
     judged: list[CheckedFile | None] = []

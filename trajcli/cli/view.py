@@ -20,7 +20,6 @@ from trajcli.streams.whole_file import refuse_overwriting, standard_output, whol
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import ViewCommand
-    from trajcli.judge.file import CheckedFile
 
 
 def run_view(options: ViewCommand) -> int:
@@ -113,11 +112,12 @@ def _shown_job(name: str, options: ViewCommand, every: bool) -> _Shown:
 def _shown_file(
     name: str, robot: str | None, output: str | None, meshes: float, *, every: bool = False
 ) -> _Shown:
+    from trajcli.output.delivery.delivered import judged_by
     from trajcli.player.recorded import scene_of_file
 
     _check_inputs_stay(output, [("the rows of", name)])
     opened = ByteSource(name)
-    checked = None if robot is None else _checked_or_reason(opened, robot)
+    checked = None if robot is None else judged_by(opened, robot)
     scene = scene_of_file(opened, robot, checked, meshes)
     said = f"{scene['title']}: {scene['verdict']['text']}, {scene['subtitle']}"
     if checked is None or isinstance(checked, str) or checked.judgement.passed:
@@ -125,16 +125,6 @@ def _shown_file(
     from trajcli.cli.check import problems_of
 
     return _Shown(scene, said, lambda: problems_of(checked, every=every))
-
-
-def _checked_or_reason(source: ByteSource, robot: str) -> CheckedFile | str:
-    """Return the judgement of a file by a job, or by the limits of a robot; else why there is none."""
-    from trajcli.cli.check import judged_file
-    from trajcli.judge.file import CheckOptions
-    from trajcli.queries.arm import names_job
-
-    by_job = names_job(robot)
-    return judged_file(source, CheckOptions(job=robot) if by_job else CheckOptions(robot=robot))
 
 
 def _check_output(path: str | None) -> None:

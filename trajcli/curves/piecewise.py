@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import lru_cache
 from math import comb, isfinite, perm
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from trajcli.errors import InputError
 from trajcli.frozen import frozen
 
 Array = NDArray[np.float64]
@@ -37,6 +38,21 @@ def read_only(values: ArrayLike) -> Array:
         return values
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False
+    return array
+
+
+def numeric(values: ArrayLike, name: str) -> NDArray[Any]:
+    """Return what a user has given as an array of numbers, of its own type.
+
+    Raises:
+        InputError: When something of it is no real number, or its rows are of several lengths.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise InputError(f"{name}: expected an array of numbers, got rows of several lengths") from None
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"{name}: expected an array of numbers, got {array.dtype}")
     return array
 
 

@@ -32,6 +32,8 @@ from trajcli.units import Quantity, joint_quantity
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _YAML_WORDS = {"null", "true", "false"}
 _STAND = "base of the rail"  # the base of a resolved robot is the frame of its first row
+_DEEPEST = 100  # levels of mappings and lists in each other; no job has as many as ten
+_ENDLESS = "does a mapping or a list hold itself?"
 _INVISIBLE = ("Cc", "Cf", "Zl", "Zp", "Cn", "Co")
 
 
@@ -161,6 +163,8 @@ def mapping_text(mapping: Mapping[str, Any]) -> str:
 
 def _plain(value: Any, path: tuple[str | int, ...]) -> Any:  # noqa: ANN401
     """Return a value with lists for arrays and tuples, and Python's numbers for numpy's."""
+    if len(path) > _DEEPEST:
+        raise InputError(f"{_path_text(path[:4])}...: more than {_DEEPEST} levels deep", hint=_ENDLESS)
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, PurePath):

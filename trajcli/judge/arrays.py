@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, numeric
 from trajcli.errors import InputError
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
@@ -19,6 +19,7 @@ from trajcli.streams.npy import share_of
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 
 _NAMES = ("times", "q", "qd", "qdd")
+_ROWS_AND_JOINTS = 2  # dimensions
 
 
 def judge_arrays(
@@ -41,7 +42,7 @@ def judge_arrays(
         InputError: When shapes do not fit, or something is not a finite number.
     """
     given = {
-        name: None if values is None else np.asarray(values)
+        name: None if values is None else numeric(values, name)
         for name, values in zip(_NAMES, (times, q, qd, qdd), strict=True)
     }
     joints = len(requirements.robot.joints)
@@ -62,8 +63,6 @@ def judge_arrays(
 
 
 def _checked(name: str, values: np.ndarray) -> Array:
-    if values.dtype.kind not in "fiu":
-        raise InputError(f"{name}: expected an array of numbers, got {values.dtype}")
     numbers = values.astype(np.float64)
     if not np.isfinite(numbers).all():
         where = ", ".join(str(int(index[0])) for index in np.nonzero(~np.isfinite(numbers)))
@@ -99,8 +98,8 @@ def requirements_of(
         FileError: When a file cannot be read.
     """
     if robot is None:
-        shape = np.shape(q)
-        bare = _bare(int(shape[-1]) if shape else 0)
+        positions = numeric(q, "q")
+        bare = _bare(positions.shape[1] if positions.ndim == _ROWS_AND_JOINTS else 0)
     elif isinstance(robot, Robot):
         bare = robot
     else:
@@ -140,7 +139,7 @@ class _Held:
 @lru_cache(maxsize=16)
 def _bare(joints: int) -> Robot:
     if joints < 1:
-        raise InputError("q: expected shape (N, n)")
+        raise InputError("q: expected shape (N, n), a row for each time and a column for each joint")
     names = tuple(Joint(f"j{number}") for number in range(1, joints + 1))
     return Robot("the motion", names, unlimited(joints), None, np.eye(4), np.eye(4))
 

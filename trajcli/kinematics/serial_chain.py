@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.curves.piecewise import Array
+from trajcli.curves.piecewise import Array, numeric
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.geometry.rotation import cos_sin
@@ -86,9 +86,9 @@ def configurations(robot: Robot, values: ArrayLike, name: str = "q") -> Array:
     """Return joint values as an array (*batch, n).
 
     Raises:
-        InputError: When the last dimension is not the number of joints, or a value is not finite.
+        InputError: When the last dimension is not the number of joints, or a value is no finite number.
     """
-    array = np.asarray(values, dtype=np.float64)
+    array = np.asarray(numeric(values, name), dtype=np.float64)
     joints = len(robot.joints)
     if array.ndim == 0 or array.shape[-1] != joints:
         given = array.shape[-1] if array.ndim else 1

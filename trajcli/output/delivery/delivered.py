@@ -1,14 +1,22 @@
-"""Plans as they are delivered: for the consumer that a job names, where it names one."""
+"""Plans as they are delivered: for the consumer that a job names, where it names one.
+
+Files of rows are judged by what their job delivers.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from trajcli.errors import TrajcliError
 from trajcli.job.read import LoadedJob
 from trajcli.planning.plan import Carried, Plan, plan_job
 
 if TYPE_CHECKING:
     from trajcli.job.report import Report
+    from trajcli.judge.file import CheckedFile, CheckOptions
+    from trajcli.streams.byte_source import ByteSource
     from trajcli.streams.decimals import Digits
     from trajcli.streams.formats import StreamFormat
 
@@ -107,3 +115,36 @@ def plan_of(loaded: LoadedJob, profile: str | None = None, carried: Carried | No
         PlanningError: When a move has no curve.
     """
     return delivered(loaded, profile, carried=carried)[0]
+
+
+def delivered_as(loaded: LoadedJob, profile: str | None, form: str) -> Plan:
+    """Return the plan of a job for a consumer, as it is written in a format of that name; see `delivered`."""
+    from trajcli.streams.formats import DEFAULT, FORMATS
+
+    named = {"fields": "npz"}.get(form, form)
+    return delivered(loaded, profile, next((FORMATS[name] for name in FORMATS if name == named), DEFAULT))[0]
+
+
+def judged_file(source: ByteSource, options: CheckOptions, plan: Plan | None = None) -> CheckedFile | str:
+    """Return the judgement of a file; why there is none where nothing of it can be judged.
+
+    Args:
+        source: The file.
+        options: What it is judged by.
+        plan: Of a job that was planned before.
+    """
+    from trajcli.judge.file import check_file
+
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is for the judge to find
+            return check_file(source, options, plan, delivered_as)
+    except TrajcliError as error:
+        return error.problems[0].text()
+
+
+def judged_by(source: ByteSource, arm: str) -> CheckedFile | str:
+    """Return the judgement of a file by a job, or by the limits of a robot; else why there is none."""
+    from trajcli.judge.file import CheckOptions
+    from trajcli.queries.arm import names_job
+
+    return judged_file(source, CheckOptions(job=arm) if names_job(arm) else CheckOptions(robot=arm))
