@@ -8,7 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant, distinct, increasing
+from trajcli.curves.piecewise import (
+    PiecewisePolynomial,
+    concatenate,
+    constant,
+    distinct,
+    increasing,
+    numeric,
+)
+from trajcli.errors import InputError
 
 
 def drawn(seed, pieces):
@@ -238,3 +246,15 @@ def test_many_times_on_many_pieces_have_a_row_each(count, monkeypatch):
     t = np.linspace(0.1, 5.9, count)
     wanted = [[np.polyval(rows[:, int(x), joint], x - int(x)) for joint in range(2)] for x in t]
     np.testing.assert_allclose(curve.evaluate(t), wanted, rtol=1e-12, atol=1e-12)
+
+
+def test_real_numbers_of_any_type_are_numbers():
+    for given_one in ([1, 2], [0.5, 2], np.array([1, 2], np.float32), np.array([1, 2], np.uint8)):
+        assert numeric(given_one, "q").tolist() == list(given_one)
+    assert numeric(np.float32(0.5), "q").dtype == np.float32
+
+
+@pytest.mark.parametrize("wrong", ["1", [True, False], [1j, 0], [None, 1], [[1, 2], [3]], {"a": 1}])
+def test_what_is_no_array_of_numbers_is_refused(wrong):
+    with pytest.raises(InputError, match="^joints: expected an array of numbers, got "):
+        numeric(wrong, "joints")

@@ -80,14 +80,16 @@ class WaypointProblem:
         a |a| / (2 jerk); before or after it the velocity must keep its bounds, too.
         """
         low, high = (_INSIDE * bound for bound in self.velocity.T)
-        least, most = (_INSIDE * bound for bound in self.acceleration.T)
+        slowing, speeding = (_INSIDE * bound for bound in self.acceleration.T)
         given = np.where(self.fixed, self.states, states)
-        bent = np.clip(given[..., 1], least, most)
-        room = np.sqrt(self.jerk * (high - low))
+        bent = np.clip(given[..., 1], slowing, speeding)
+        to_and_fro = np.sqrt(self.jerk * (high - low))
         velocity = np.where(self.fixed[..., 0], self.states[..., 0], given[..., 0])
         ahead = np.maximum(np.minimum(high - velocity, velocity - low), 0.0)
         kept = np.sqrt(2 * self.jerk * ahead)
-        bent = np.where(self.fixed[..., 0], np.clip(bent, -kept, kept), np.clip(bent, -room, room))
+        bent = np.where(
+            self.fixed[..., 0], np.clip(bent, -kept, kept), np.clip(bent, -to_and_fro, to_and_fro)
+        )
         bent = np.where(self.fixed[..., 1], self.states[..., 1], bent)
         used = bent**2 / (2 * self.jerk)
         velocity = np.where(self.fixed[..., 0], velocity, np.clip(velocity, low + used, high - used))
