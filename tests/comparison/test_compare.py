@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tables import changed, cut, exactly, motion, table, without
 
-from trajcli.comparison.difference import ALL, compare, describe
+from trajcli.comparison.difference import ALL, as_json, compare, describe
 from trajcli.errors import InputError
 from trajcli.streams.table import Table
 
@@ -143,6 +143,22 @@ def test_a_file_that_ends_early_differs():
         assert (found.rows, found.first, found.worst.difference) == (60, None, 0)
         assert found.ended == (index, a.columns[59, 0])
         assert "ends at t = 0.59 s, before" in describe(found)
+        assert as_json(found)["ended"] == {"file": (one.file, other.file)[index], "time": a.columns[59, 0]}
+
+
+@pytest.mark.parametrize(
+    ("count", "more"), [(1, []), (20, []), (21, ["  and 1 more"]), (25, ["  and 5 more"])]
+)
+def test_columns_that_differ_are_listed_up_to_a_number(count, more):
+    steps = np.arange(4.0)
+    names = {"t": steps} | {f"q{number}": steps for number in range(1, count + 1)}
+    a = table(names, "a.csv")
+    b = table({name: values + 0.5 * (name != "t") for name, values in names.items()}, "b.csv")
+    lines = describe(exactly(a, b)).splitlines()
+    listed = [line for line in lines if line.startswith("  4 rows of")]
+    assert len(listed) == (min(count, 20) if count > 1 else 0)
+    assert lines[len(lines) - len(more) :] == more
+    assert sum("more" in line for line in lines) == len(more)
 
 
 def test_a_last_row_off_the_grid_is_no_other_grid():

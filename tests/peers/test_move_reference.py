@@ -157,3 +157,11 @@ def test_what_rounding_leaves_below_a_bound_is_none() -> None:
     bound = ReferenceReport(duration=span.duration * (1 + 1e-10), ratio=1.0, joint="j1")
     assert move_reference.contradictions_of([span], [bound]) == []
     assert move_reference.contradictions_of([span], [None]) == []
+
+
+@pytest.mark.parametrize("duration", [0.5, 0.9, 3.0])
+def test_a_ratio_is_told_for_bounds_of_any_length(duration: float) -> None:
+    robot = trajcli.plan(JOB).loaded.robot
+    found = move_reference.bound_report(LowerBound(duration, 0), 2.0, robot)
+    assert found.ratio == pytest.approx(2.0 / duration, rel=1e-12)
+    assert move_reference.bound_report(LowerBound(0.0, None), 2.0, robot).ratio is None

@@ -14,7 +14,7 @@ from trajcli.kinematics.robot import Limits, unlimited
 from trajcli.output.report import report_of
 from trajcli.peers.geometric_path import GeometricPath
 from trajcli.peers.move_reference import path_reference_of
-from trajcli.peers.path_reference import LimitBreach, limit_use, path_reference, reference_along
+from trajcli.peers.path_reference import LimitBreach, _grid, limit_use, path_reference, reference_along
 from trajcli.planning.plan import plan_job
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -41,6 +41,19 @@ def test_a_straight_line_has_the_trapezoid_of_the_textbook():
     assert other.use is not None
     assert other.use.used == pytest.approx(1.0, abs=1e-6)
     assert other.use.joint == 0
+
+
+@pytest.mark.parametrize("length", [2.0**-10, 1.0, 2.0**10])
+def test_the_grid_of_a_path_is_as_fine_whatever_its_unit(length):
+    """Breaks are points of it; between them they lie evenly, so many to the whole length of a path."""
+    breaks = length * np.array([0.0, 0.25, 0.375, 1.0])
+    grid = _grid(PiecewisePolynomial(breaks, np.ones((1, 3, 1))), 0.0, length)
+    unit = _grid(PiecewisePolynomial(breaks / length, np.ones((1, 3, 1))), 0.0, 1.0)
+    assert grid.size == unit.size
+    assert grid / length == pytest.approx(unit, abs=1e-12)
+    assert set(breaks.tolist()) <= set(grid.tolist())
+    steps = np.diff(grid)
+    assert steps.max() <= 1.01 * length / 100
 
 
 def test_corners_are_stops():

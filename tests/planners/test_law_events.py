@@ -45,6 +45,7 @@ def test_who_sets_the_bound_is_said() -> None:
     assert stops.message.endswith("from stop to stop its slowest joints need {bound} in all")
     neither = distance_from_bound(motion(3.0, 2.0, bounding_joint=None, bounded_by_stops=False), ROBOT)
     assert neither.message.endswith("limits of velocity and acceleration alone ask for {bound}")
+    assert neither.message.startswith("at most 50 % above")
     assert "nothing is known" in distance_from_bound(motion(3.0, 0.0), ROBOT).message
 
 
