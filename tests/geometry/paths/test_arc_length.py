@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from trajcli.geometry.paths.arc_length import ArcLength
+from trajcli.geometry.paths.arc_length import ArcLength, FrameTransport
 
 
 def parabola(width):
@@ -27,3 +28,24 @@ def test_length_and_parameter_of_a_parabola(width):
     u = np.linspace(0, 1, 201)
     np.testing.assert_allclose(arc.parameter(exact(width, u)), u, rtol=0, atol=3e-14 / width)
     assert arc.knots.size < 60
+
+
+def wandering(u):
+    """Return a rate whose axis turns and whose size changes, rad."""
+    return np.stack([3 * np.cos(4 * u), 2 * np.sin(3 * u) + u**2, 4 * u**3 - 1], axis=-1)
+
+
+def test_transport_is_of_sixth_order_and_the_same_between_its_knots():
+    def equation(u, flat):
+        return np.cross(wandering(u), flat.reshape(3, 3), axisb=0, axisc=0).ravel()
+
+    u = np.linspace(0, 1, 13)
+    exact = solve_ivp(equation, (0, 1), np.eye(3).ravel(), "DOP853", u, rtol=1e-13, atol=1e-14)
+    rotations = exact.y.T.reshape(-1, 3, 3)
+    off = [
+        np.abs(FrameTransport(wandering, np.linspace(0, 1, steps + 1)).at(u) - rotations).max()
+        for steps in (2, 4, 8, 16)
+    ]
+    assert off[1] < off[0] / 45
+    assert off[2] < off[1] / 58
+    assert off[3] < min(off[2] / 61, 5e-8)

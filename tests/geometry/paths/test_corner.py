@@ -15,6 +15,7 @@ from trajcli.geometry.paths.corner import (
     curvature_jumps,
     room_for_radius,
     round_corner,
+    sharp_kind,
     turn_between,
 )
 from trajcli.geometry.paths.position import Line
@@ -114,6 +115,39 @@ def test_the_length_is_the_integral_of_the_speed(turn):
     np.testing.assert_allclose(np.linalg.norm(steps, axis=-1), blend.length / 20000, rtol=1e-3)
 
 
+@pytest.mark.parametrize("pitch", [0.0, 0.3])
+def test_a_corner_between_a_line_and_an_arc_is_the_same_from_either_side(pitch):
+    line, arc = Line([-1, -0.5, 0.1], [0, 0, 0]), Arc([0, 0, 0], [0, 0.3, 0.1], [1, -1, 3], 2.0, pitch)
+    middle = arc.center + arc.axis * (pitch * arc.angle / (2 * np.pi))
+    back = Arc(arc.end, middle, arc.axis, -arc.angle, pitch), Line(line.end, line.start)
+    there, reverse = (round_corner(*pair, 0.25) for pair in ((line, arc), back))
+    place, other = (blend.evaluate(np.linspace(0, blend.length, 41))[0] for blend in (there, reverse))
+    np.testing.assert_allclose(other[::-1], place, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("point", [[0, 0, 0], [-0.5, -0.2, 0], [0.1, 0.4, -0.3], [0.3, -0.1, 0.2]])
+def test_the_distance_is_that_of_the_nearest_point_of_the_blend(point):
+    blend = round_corner(Line([-1, -0.5, 0.1], [0, 0, 0]), Arc([0, 0, 0], [0, 0.3, 0.1], [1, -1, 3], 2.0), 0.25)
+    place = blend.evaluate(np.linspace(0, blend.length, 4001))[0]
+    nearest = np.linalg.norm(place - point, axis=-1).min()
+    assert blend.distance(np.array(point, dtype=float)) == pytest.approx(nearest, abs=1e-6)
+
+
+@pytest.mark.parametrize(("turn", "kind"), [(0.0, "smooth"), (3e-11, "smooth"), (1e-9, "stop")])
+def test_a_turn_is_a_corner_where_a_robot_would_notice_it(turn, kind):
+    assert sharp_kind(*lines(turn)) == kind
+
+
+@pytest.mark.parametrize(("ratio", "kind"), [(1 + 3e-11, "smooth"), (1 + 1e-6, "bend"), (-1, "bend")])
+@pytest.mark.parametrize("radius", [2.0, -2.0, 0.002])
+def test_curvatures_differ_by_more_than_their_rounding(radius, ratio, kind):
+    before = Arc(
+        [-abs(radius) * np.sin(1), radius * (1 - np.cos(1)), 0], [0, radius, 0], [0, 0, radius], 1.0
+    )
+    after = Arc([0, 0, 0], [0, radius * ratio, 0], [0, 0, radius * ratio], 1.0)
+    assert sharp_kind(before, after) == kind
+
+
 def test_a_blend_within_a_circle_is_nearly_the_circle():
     whole = Arc([1, 0, 0], [0, 0, 0], [0, 0, 1], 2.0)
     halves = (
@@ -175,6 +209,13 @@ def test_of_an_arc_at_most_a_quarter_is_cut_away():
     assert room_for_radius(before, Arc([0, 0, 0], [0, 2, 0], [0, 0, 1], 6.0)) == pytest.approx(np.pi)
     assert room_for_radius(before, Arc([0, 0, 0], [0, 2, 0], [0, 0, 1], 1.0)) == 2
     assert room_for_radius(*lines(1.0)) == 1
+    assert room_for_radius(Line([-0.4, 0, 0], [0, 0, 0]), Line([0, 0, 0], [0, 3, 0])) == 0.4
+    assert room_for_radius(Line([-9, 0, 0], [0, 0, 0]), Line([0, 0, 0], [0, 3, 0])) == 3
+    arriving = Arc([-2, 2, 0], [0, 2, 0], [0, 0, 1], np.pi * 2.5)  # it ends in the corner, along x
+    assert room_for_radius(arriving, Line([0, 0, 0], [0, 9, 0])) == pytest.approx(np.pi)
+    for radius, other in ((1.0, np.pi / 2), (3.0, np.pi)):
+        leaving = Arc([0, 0, 0], [radius, 0, 0], [0, 0, 1], 6.0)
+        assert room_for_radius(arriving, leaving) == pytest.approx(other)
 
 
 def test_what_meets_in_a_corner():
