@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from joined_by_scipy import largest_share
+from random_jobs import loaded as job_of
 from tiers import few
 
 import trajcli
@@ -125,6 +126,24 @@ def _said_to_be_over(name: str, factors: Sequence[float], none: Sequence[float])
             said += 1
     assert not any(map(moves.are_over, none))
     return said
+
+
+@pytest.mark.parametrize("acceleration", [[-2, 4], [-4, 2], [-2, 10]])
+def test_limits_that_differ_by_direction_are_tightened_in_proportion(acceleration: list[float]) -> None:
+    """The looser one is not lowered to the tighter one: of 4 in place of 2 that would cost a tenth."""
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "limits": {"velocity": 1.0, "acceleration": [acceleration] * 6, "jerk": 3000},
+        "start": {"joints": [0.0] * 6},
+        "moves": [{"planner": "jerk_limited", "to": {"joints": [1, 0, 0, 0, 0, 0]}}],
+        "output": {"rate": 500},
+        "when_over_limit": "slow",
+    }
+    fastest = plan_job(job_of(job)).trajectory.duration
+    made = plan_for(*job_for(job_of(job), "ur-servoj", {}), Writing(FORMATS["csv"]))
+    assert made.keeps
+    assert fastest < made.duration < 1.02 * fastest
 
 
 def test_moves_that_are_said_to_be_over_a_limit_between_rows_are() -> None:

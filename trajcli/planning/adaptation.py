@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import KIND_OF
@@ -25,7 +26,8 @@ class Adaptation:
     """By what moves are planned otherwise than their limits alone say.
 
     Attributes:
-        caps: Magnitudes within which they are planned, SI.
+        caps: Magnitudes within which they are planned, SI; of bounds that differ by direction the larger one's, and
+            the other one is as many times tighter.
         stretches: How many times longer a move lasts behind that, by its index.
         period: Of rows on which the breaks of their curves shall fall, s; None for any.
         known: Moves that were planned already, with all that they depend on, their rows too.
@@ -99,10 +101,18 @@ class Adaptation:
             if name == "velocity_by_position":
                 bounds[joint, 0] = cap
             else:
-                bounds[joint] = np.clip(bounds[joint], -cap, cap)
+                nearer = cap * proportions(bounds[joint])
+                bounds[joint] = np.clip(bounds[joint], -nearer, nearer)
             changed: dict[str, Any] = {kind.key: bounds}
             limits = replace(limits, **changed)
         return robot if limits is robot.limits else replace(robot, limits=limits)
+
+
+def proportions(bounds: Array) -> Array:
+    """Return how large the bounds (2,) of a joint are beside the larger finite one, and 1 where there is none."""
+    sizes = np.abs(bounds)
+    finite = np.isfinite(sizes)
+    return np.where(finite, sizes, 1.0) / np.where(finite, sizes[finite].max(initial=0.0), 1.0)
 
 
 def without_bounds(planned: Planned) -> Planned:

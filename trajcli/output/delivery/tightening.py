@@ -10,7 +10,7 @@ import numpy as np
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.limits.kinds import KIND_OF, STRETCHABLE
-from trajcli.planning.adaptation import Adaptation, Cap
+from trajcli.planning.adaptation import Adaptation, Cap, proportions
 from trajcli.planning.plan import Plan
 
 _HOPELESS = 1e3  # times a limit: a step of velocity, which no motion of any duration is without
@@ -98,10 +98,17 @@ def _movers(plan: Plan, number: int) -> Iterator[int]:
 def _slow_down(caps: dict[Cap, float], plan: Plan, number: int, share: float) -> None:
     """Lower all caps of a move so that it moves at a share of its speed."""
     for order in (1, 2, 3):
-        for joint, peak in enumerate(plan.verdict.peaks[number][order].magnitude.tolist()):
+        for joint in range(len(plan.trajectory.joint_names)):
             key = plan.moves[number].index, QUANTITIES[order], joint
-            if peak:
+            if peak := _reached(plan, number, order, joint):
                 caps[key] = min(caps.get(key, np.inf), peak) * share**order
+
+
+def _reached(plan: Plan, number: int, order: int, joint: int) -> float:
+    """Return the largest rate of a joint in a move, in either direction in proportion to its larger bound."""
+    peaks, bounds = plan.verdict.peaks[number][order], plan.moves[number].robot.limits.of_order(order)[joint]
+    rates = np.maximum([-peaks.low[joint], peaks.high[joint]], 0.0)
+    return float((rates / proportions(bounds)).max())
 
 
 def _tighten(caps: dict[Cap, float], plan: Plan, number: int, passed: tuple[str, float, int]) -> None:
@@ -114,8 +121,9 @@ def _tighten(caps: dict[Cap, float], plan: Plan, number: int, passed: tuple[str,
     elif name == "velocity_by_position":
         limit, share = float(limits.velocity_by_position[joint, 0]), share**2
     else:
-        limit = float(np.abs(getattr(limits, kind.key)[joint]).max())
+        sizes = np.abs(getattr(limits, kind.key)[joint])
+        limit = float(sizes[np.isfinite(sizes)].max(initial=0.0)) or np.inf
         if name in QUANTITIES:
-            reached = float(plan.verdict.peaks[number][kind.order or 0].magnitude[joint]) or np.inf
+            reached = _reached(plan, number, kind.order or 0, joint) or np.inf
     key = move.index, name, joint
     caps[key] = min(caps.get(key, np.inf), reached, limit) * share
