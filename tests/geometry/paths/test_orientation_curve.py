@@ -78,7 +78,7 @@ def test_a_rotation_alone_goes_by_its_angle():
 
 def test_half_a_turn_has_one_axis_whatever_the_rounding():
     noise = np.random.default_rng(5)
-    for axis in ([2, -1, 2], [0, 0, 1], [0, -1, 0], [0, 3, -4], [-1, 0, 0]):
+    for axis in ([2, -1, 2], [0, 0, 1], [0, -1, 0], [0, 3, -4], [-1, 0, 0], [-1, 300, 0]):
         unit = np.array(axis) / np.linalg.norm(axis)
         expected = unit * np.sign(unit[np.flatnonzero(unit)[0]])
         half = Rotation.from_rotvec(np.pi * unit).as_matrix()
@@ -88,6 +88,14 @@ def test_half_a_turn_has_one_axis_whatever_the_rounding():
             np.testing.assert_allclose(curve.vectors[0], np.pi * expected, rtol=0, atol=1e-13)
             np.testing.assert_allclose(curve.evaluate(np.ones(1))[0][0], start @ half, rtol=0, atol=1e-14)
             np.testing.assert_allclose(curve.angles_turned, np.pi)
+
+
+def test_beside_half_a_turn_the_end_is_met():
+    vector = -(np.pi - 7e-10) * np.array([0.6, 0.0, 0.8])
+    end = Rotation.from_rotvec(vector).as_matrix()
+    found = turn_vectors(np.eye(3)[None], end[None])
+    assert found[0, 0] > 0
+    np.testing.assert_allclose(Rotation.from_rotvec(found[0]).as_matrix(), end, rtol=0, atol=1e-14)
 
 
 def test_a_little_less_than_half_a_turn_is_not_turned_round():
@@ -145,6 +153,10 @@ def test_equal_rates_need_no_stop():
     turns = Rotation.from_rotvec([[0, 0, 0], [0.3, 0, 0], [0.9, 0, 0]]).as_matrix()
     assert not AxisAngleOrientation(turns, chain.progress).stops.size
     np.testing.assert_array_equal(AxisAngleOrientation(turns[[0, 1, 0]], chain.progress).stops, [1])
+    aside = Rotation.from_rotvec([0.3, 0, 0]) * Rotation.from_rotvec([0, 0.6, 0])  # as fast, about another axis
+    np.testing.assert_array_equal(
+        AxisAngleOrientation(np.array([*turns[:2], aside.as_matrix()]), chain.progress).stops, [1]
+    )
     faded = join(chain.segments, 0.2)
     assert not faded.stops.size
     curve = AxisAngleOrientation(random_rotations(2, 3), faded.progress)
@@ -213,6 +225,7 @@ def test_what_does_not_fit_is_refused():
     mirror = np.diag([1.0, 1.0, -1.0])
     for make in (
         lambda: AxisAngleOrientation.between(mirror, np.eye(3)),
+        lambda: AxisAngleOrientation.between(np.eye(3), mirror),
         lambda: FixedOrientation(mirror, 1.0),
         lambda: TangentOrientation(Pivot(np.zeros(3), np.zeros(3), 1.0), mirror),
     ):

@@ -11,7 +11,12 @@ from scipy.spatial.transform import Rotation
 from trajcli.errors import InputError
 from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.chain import join
-from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation, TangentOrientation
+from trajcli.geometry.paths.orientation import (
+    AxisAngleOrientation,
+    FixedOrientation,
+    SegmentProgress,
+    TangentOrientation,
+)
 from trajcli.geometry.paths.pose import PoseCurve, PosePath, Screw
 from trajcli.geometry.paths.position import Line, Pivot
 from trajcli.geometry.pose import build
@@ -88,6 +93,8 @@ def test_a_screw_of_half_a_turn_has_one_axis_whatever_the_rounding():
     )
     with pytest.raises(InputError, match="mirrors space"):
         Screw(start, np.diag([1.0, 1, -1, 1]))
+    with pytest.raises(InputError, match="mirrors space"):
+        Screw(np.diag([1.0, 1, -1, 1]), start)
 
 
 @pytest.mark.parametrize(
@@ -160,5 +167,27 @@ def test_a_rotation_in_place():
 
 
 def test_place_and_orientation_must_be_as_long():
-    with pytest.raises(ValueError, match=r"differ in length: 3.0, 2.0"):
-        PoseCurve(Line([0, 0, 0], [1, 2, 2]), FixedOrientation(np.eye(3), 2.0))
+    for length in (2.0, 4.0, 3.0 + 1e-7):
+        with pytest.raises(ValueError, match=rf"differ in length: 3.0, {length}"):
+            PoseCurve(Line([0, 0, 0], [1, 2, 2]), FixedOrientation(np.eye(3), length))
+    assert PoseCurve(Line([0, 0, 0], [1, 2, 2]), FixedOrientation(np.eye(3), 3.0 + 1e-12)).length == 3.0
+
+
+@pytest.mark.parametrize(("apart", "breaks"), [(1e-12, 1), (1e-7, 2)])
+def test_breaks_beside_each_other_are_one(apart, breaks):
+    chain = join([Line([0, 0, 0], [1, 0, 0]), Line([1, 0, 0], [1, 1, 0])])
+    progress = SegmentProgress(np.array([0.0, 1.0 + apart, 2.0]), np.zeros(1))
+    curve = PoseCurve(chain, AxisAngleOrientation(Rotation.random(3, random_state=3).as_matrix(), progress))
+    assert curve.breaks.size == curve.stops.size == breaks
+
+
+def test_at_a_corner_both_sides_are_asked():
+    chain = join([Line([0, 0, 0], [1, 0, 0]), Line([1, 0, 0], [1, 1, 0])])
+    place = Rotation.random(3, random_state=3).as_matrix()
+    curve = PoseCurve(chain, AxisAngleOrientation(place, chain.progress))
+    for side in ("left", "right"):
+        first = curve.evaluate(np.ones(1), side)[1]
+        np.testing.assert_array_equal(first[:, :3], chain.evaluate(np.ones(1), side)[1])
+        np.testing.assert_array_equal(first[:, 3:], curve.orientation.evaluate(np.ones(1), side)[1])
+    held = PoseCurve(chain, FixedOrientation(place[0], chain.length))
+    np.testing.assert_array_equal(held.stops, [1])

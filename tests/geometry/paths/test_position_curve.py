@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from curve_laws import attitude_is_kept, keeps_the_laws_of_a_place
+from curve_laws import attitude_is_kept, keeps_the_laws_of_a_place, keeps_the_laws_of_a_rotation
 
 from trajcli.errors import InputError, PlanningError
-from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot
+from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
+from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot, nearest
 
 
 def test_a_line_goes_straight_from_end_to_end():
@@ -58,6 +60,40 @@ def test_a_stretch_is_a_part_of_the_whole():
         part.evaluate(np.array([0.8]))
 
 
+def test_a_part_of_a_chain_begins_a_transport_of_its_own():
+    segments = [
+        Line([-1, 0, 0], [0, 0, 0]),
+        Arc([0, 0, 0], [0, 0.3, 0.3], [1, -1, 1], 1.0, 0.2),
+    ]
+    rounded = join(segments, 0.2)
+    part = PartOfCurve(rounded, 0.9, rounded.length - 0.1)
+    attitude_is_kept(part)
+    keeps_the_laws_of_a_rotation(part.transport, part, tolerance=2e-5)
+    sharp = join([*segments, Line(segments[1].end, [2, 1, 1])])
+    part, corner = PartOfCurve(sharp, 0.4, sharp.length - 0.1), sharp.breaks
+    np.testing.assert_allclose(part.breaks, corner - 0.4, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(part.stops, sharp.stops - 0.4, rtol=0, atol=1e-15)
+    for side in ("left", "right"):
+        for own, whole in zip(part.evaluate(part.breaks, side), sharp.evaluate(corner, side), strict=True):
+            np.testing.assert_allclose(own, whole, rtol=0, atol=1e-14)
+        turned, before = sharp.transport(corner, side), sharp.transport(np.array([0.4]))[0]
+        own = part.transport(part.breaks, side)
+        np.testing.assert_allclose(own[0] @ before, turned[0], rtol=0, atol=1e-14)
+        np.testing.assert_array_equal(own[1], turned[1])
+    rising = np.ones((4, 2))
+    for own, whole in zip(
+        part.majorants(np.array([0.1, 0.9]), rising),
+        sharp.majorants(np.array([0.5, 1.3]), rising),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(own, whole)
+
+
+def test_of_two_breaks_as_near_the_lower_one_is_nearest():
+    s = np.array([-1.0, 0.9, 1.0, 1.1, 3.0, 9.0])
+    np.testing.assert_array_equal(nearest(np.array([0.0, 2.0, 4.0]), s), [0, 0, 0, 2, 2, 4])
+
+
 def test_a_pivot_stays_where_it_is():
     pivot = Pivot([1, 2, 3], [1, 2, 3 + 1e-10], 1.5)
     place, first, second = pivot.evaluate(np.array([0, 1.5]))
@@ -67,7 +103,10 @@ def test_a_pivot_stays_where_it_is():
     np.testing.assert_array_equal(Pivot([1, 2, 3], [1, 2, 3], 0).evaluate(np.zeros(1))[0], [[1, 2, 3]])
     with pytest.raises(InputError, match="1e-06 m apart: this is no rotation in place"):
         Pivot([1, 2, 3], [1, 2, 3 + 1e-6], 1.5)
-    with pytest.raises(InputError, match="must be a finite angle"):
-        Pivot([1, 2, 3], [1, 2, 3], -1)
+    with pytest.raises(InputError, match="5e-09 m apart"):
+        Pivot([0, 0, 0], [0, 5e-9, 0], 1.5)
+    for length in (-1, np.inf, np.nan):
+        with pytest.raises(InputError, match="must be a finite angle"):
+            Pivot([1, 2, 3], [1, 2, 3], length)
     with pytest.raises(PlanningError, match="no direction of travel"):
         pivot.transport(np.zeros(1))

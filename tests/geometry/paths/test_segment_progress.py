@@ -24,6 +24,40 @@ def test_without_blends_values_are_straight_from_border_to_border():
     assert not bends.any()
 
 
+@pytest.mark.parametrize("widths", [(0.2, 0.3), (0.5, 0.8), (0.0, 0.4), (0.05, 0.8), (0.5, 0.0)])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_rate_of_a_segment_rises_and_falls_at_its_two_borders(widths, side):
+    def risen(border, width):
+        x = (s - border + width) / (2 * width or 1)
+        sharp = s > border if side == "left" else s >= border
+        return np.where(width > 0, np.where(x < 0, 0, np.where(x > 1, 1, x * x * (3 - 2 * x))), sharp)
+
+    s = np.sort(np.concatenate([np.linspace(0, 2.8, 2801), BORDERS]))
+    first, second = (risen(*each) for each in zip(BORDERS[1:-1], widths, strict=True))
+    share = np.stack([1 - first, first - second, second], axis=-1) / np.diff(BORDERS)
+    values, slopes, _ = SegmentProgress(BORDERS, np.array(widths)).between(TARGETS, s, side)
+    np.testing.assert_allclose(slopes, share @ np.diff(TARGETS, axis=0), rtol=0, atol=1e-12)
+    steps = np.diff(s)[:, None] * (slopes[1:] + slopes[:-1]) / 2
+    whole = TARGETS[0] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    np.testing.assert_allclose(values, whole, rtol=0, atol=8e-3)  # rates step without a blend
+
+
+@pytest.mark.parametrize(
+    ("borders", "widths", "breaks"),
+    [
+        ([0, 0.5, 2], [0.5], [0.5, 1]),
+        ([0, 1.5, 2], [0.5], [1, 1.5]),
+        ([0, 1, 2, 3], [0.4999, 0.4999], [0.5001, 1, 1.4999, 1.5001, 2, 2.4999]),
+        ([0, 1, 2, 3], [0.5, 0.5 - 1e-13], [0.5, 1, 1.5, 2, 2.5]),
+        ([0, 1, 2], [0.0], [1]),
+    ],
+)
+def test_breaks_are_inside_and_apart(borders, widths, breaks):
+    progress = SegmentProgress(np.array(borders, dtype=float), np.array(widths))
+    assert progress.breaks.shape == (len(breaks),)
+    np.testing.assert_allclose(progress.breaks, breaks, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("widths", [(0.2, 0.3), (0.5, 0.8), (0.0, 0.4)])
 def test_derivatives_are_those_of_the_values(widths):
     progress, h = SegmentProgress(BORDERS, np.array(widths)), 1e-6
@@ -50,5 +84,6 @@ def test_one_segment_and_one_of_no_length():
         values, TARGETS[0] + np.array([[0.0], [0.25], [1.0]]) * (TARGETS[1] - TARGETS[0])
     )
     np.testing.assert_allclose(slopes, np.tile((TARGETS[1] - TARGETS[0]) / 2.0, (3, 1)))
+    assert np.isfinite(SegmentProgress.even(0.0).majorant(np.zeros(1), np.zeros(1), np.ones((4, 1)))).all()
     still = SegmentProgress.even(0.0).between(TARGETS[:2], np.zeros(1))
     np.testing.assert_allclose(still[0], TARGETS[:1])
