@@ -127,7 +127,9 @@ def test_a_corner_between_a_line_and_an_arc_is_the_same_from_either_side(pitch):
 
 @pytest.mark.parametrize("point", [[0, 0, 0], [-0.5, -0.2, 0], [0.1, 0.4, -0.3], [0.3, -0.1, 0.2]])
 def test_the_distance_is_that_of_the_nearest_point_of_the_blend(point):
-    blend = round_corner(Line([-1, -0.5, 0.1], [0, 0, 0]), Arc([0, 0, 0], [0, 0.3, 0.1], [1, -1, 3], 2.0), 0.25)
+    blend = round_corner(
+        Line([-1, -0.5, 0.1], [0, 0, 0]), Arc([0, 0, 0], [0, 0.3, 0.1], [1, -1, 3], 2.0), 0.25
+    )
     place = blend.evaluate(np.linspace(0, blend.length, 4001))[0]
     nearest = np.linalg.norm(place - point, axis=-1).min()
     assert blend.distance(np.array(point, dtype=float)) == pytest.approx(nearest, abs=1e-6)
@@ -141,9 +143,7 @@ def test_a_turn_is_a_corner_where_a_robot_would_notice_it(turn, kind):
 @pytest.mark.parametrize(("ratio", "kind"), [(1 + 3e-11, "smooth"), (1 + 1e-6, "bend"), (-1, "bend")])
 @pytest.mark.parametrize("radius", [2.0, -2.0, 0.002])
 def test_curvatures_differ_by_more_than_their_rounding(radius, ratio, kind):
-    before = Arc(
-        [-abs(radius) * np.sin(1), radius * (1 - np.cos(1)), 0], [0, radius, 0], [0, 0, radius], 1.0
-    )
+    before = Arc([-abs(radius) * np.sin(1), radius * (1 - np.cos(1)), 0], [0, radius, 0], [0, 0, radius], 1.0)
     after = Arc([0, 0, 0], [0, radius * ratio, 0], [0, 0, radius * ratio], 1.0)
     assert sharp_kind(before, after) == kind
 

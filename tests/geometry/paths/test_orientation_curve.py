@@ -153,7 +153,8 @@ def test_equal_rates_need_no_stop():
     turns = Rotation.from_rotvec([[0, 0, 0], [0.3, 0, 0], [0.9, 0, 0]]).as_matrix()
     assert not AxisAngleOrientation(turns, chain.progress).stops.size
     np.testing.assert_array_equal(AxisAngleOrientation(turns[[0, 1, 0]], chain.progress).stops, [1])
-    aside = Rotation.from_rotvec([0.3, 0, 0]) * Rotation.from_rotvec([0, 0.6, 0])  # as fast, about another axis
+    # as fast, about another axis
+    aside = Rotation.from_rotvec([0.3, 0, 0]) * Rotation.from_rotvec([0, 0.6, 0])
     np.testing.assert_array_equal(
         AxisAngleOrientation(np.array([*turns[:2], aside.as_matrix()]), chain.progress).stops, [1]
     )
