@@ -26,8 +26,8 @@ class Adaptation:
     """By what moves are planned otherwise than their limits alone say.
 
     Attributes:
-        caps: Magnitudes within which they are planned, SI. Of bounds that differ by direction it is that of the
-            larger one, and the other one is as many times tighter.
+        caps: Magnitudes within which they are planned, SI. Of bounds that differ by direction it is the
+            larger one's, and the other one is as many times tighter.
         stretches: How many times longer a move lasts behind that, by its index.
         period: Of rows on which the breaks of their curves shall fall, s; None for any.
         known: Moves that were planned already, with all that they depend on, their rows too.
@@ -109,7 +109,7 @@ class Adaptation:
 
 
 def proportions(bounds: Array) -> Array:
-    """Return how large the bounds (2,) of a joint are beside the larger one; 1 for those that are infinite."""
+    """Return how large the bounds (2,) of a joint are beside the larger one; 1 for infinite ones."""
     sizes = np.abs(bounds)
     finite = np.isfinite(sizes)
     return np.where(finite, sizes, 1.0) / np.where(finite, sizes[finite].max(initial=0.0), 1.0)
