@@ -210,6 +210,47 @@ def test_what_is_no_arc_is_named(make, error, message):
         make()
 
 
+@pytest.mark.parametrize(
+    ("make", "fits"),
+    [
+        (lambda: Arc([5e-10, 0, 0], [0, 0, 0], [0, 0, 1], 1.0), False),  # of no radius
+        (lambda: Arc([1, 0, 0], [0, 0, 0], [0, 0, 1], -5e-10), False),  # of no length
+        (lambda: Arc([1, 0, 0], [0, 0, 0], [0, 0, 1], -1e-8), True),
+        (lambda: Arc([0.1, 0, 2e-4], [0, 0, 0], [0, 0, 1], 1.0), False),  # above its plane by 0.002 radii
+        (lambda: Arc([0.1, 0, -2e-4], [0, 0, 0], [0, 0, 1], 1.0), False),
+        (lambda: Arc([0.1, 0, -5e-5], [0, 0, 0], [0, 0, 1], 1.0), True),
+        (lambda: Arc([10, 0, -5e-3], [0, 0, 0], [0, 0, 1], 1.0), True),
+        (lambda: Arc.around([1, 0, 0], [0, 0, 0], [1, 5e-10, 0]), False),  # of no chord
+        (lambda: Arc.around([1, 0, 0], [1.5e-3, 1.5e-3, 0], [0, 1, 0]), True),  # a center out of the middle
+        (lambda: Arc.around([1, 0, 0], [-1.5e-3, 1.5e-3, 0], [0, 1, 0]), False),
+        (lambda: Arc.around([1, 0, 0], [1.5e-3, -1.5e-3, 0], [0, 1, 0]), False),
+        (lambda: Arc.around([1, 0, 0], [0, 5e-4, 0], [np.cos(0.1), np.sin(0.1), 0]), True),
+        (
+            lambda: Arc.around([1, 0, 0], [0, 0, 0], [-np.cos(5e-3), np.sin(5e-3), 0]),
+            True,
+        ),  # nearly half a turn
+        (lambda: Arc.around([1, 0, 0], [0, 0, 0], [-np.cos(5e-4), np.sin(5e-4), 0]), False),
+        (lambda: Arc.through([0, 0, 0], [1, 1e-7, 0], [2, 0, 0]), False),  # nearly a line
+        (lambda: Arc.through([0, 0, 0], [1, 3e-5, 0], [2, 0, 0]), True),
+    ],
+)
+def test_what_rounding_or_typed_digits_explain_is_an_arc_and_no_more(make, fits):
+    if fits:
+        make()
+        return
+    with pytest.raises((InputError, PlanningError)):
+        make()
+
+
+@pytest.mark.parametrize("angle", [1.5, 5.0, -1.5, -5.0])
+def test_where_a_point_of_a_circle_is_passed(angle):
+    arc = Arc([1, 2, 3], [1.5, 2, 3], [0, 0, 2], angle)
+    s = np.linspace(0, arc.length, 7)
+    np.testing.assert_allclose([arc.s_of(p) for p in arc.evaluate(s)[0]], s, rtol=0, atol=1e-14)
+    beyond = Arc(arc.start, arc.center, arc.axis, angle * 1.1).end
+    assert arc.s_of(beyond) == arc.length
+
+
 def test_the_message_names_the_center_that_would_do():
     with pytest.raises(PlanningError) as caught:
         Arc.around([1, 0, 0], [0, 0, 0], [0, 1.2, 0])
