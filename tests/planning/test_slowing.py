@@ -65,3 +65,19 @@ def test_the_range_is_left_ever_further_on_either_side(sign: int) -> None:
     assert why is not None
     assert why.message == "the longer it lasts, the further {joint} goes beyond its position limit"
     assert why.amounts == {"joint": "j1"}
+    job["limits"] = {"position": 9, "velocity": 1.1, "acceleration": 8}
+    assert plan_job(loaded(job)).verdict.passed
+
+
+def test_a_move_between_moving_states_is_slowed_to_a_limit_of_the_tool() -> None:
+    job = {
+        "version": 1,
+        "robot": "ur5e",
+        "limits": {"tcp": {"speed": 0.3}},
+        "start": {"joints": [0, -1, 1, 0, 0, 0], "velocity": [0.1, 0, 0, 0, 0, 0]},
+        "moves": [{"planner": "quintic", "to": {"joints": [0.5, -1, 1, 0, 0, 0]}, "duration": 1.5}],
+        "when_over_limit": "slow",
+    }
+    plan = plan_job(loaded(job))
+    assert plan.verdict.passed
+    assert [event.kind for event in plan.events] == ["slowed"]
