@@ -86,3 +86,24 @@ def test_what_cannot_be_composed_is_named():
         compose(path, constant([0.5, 0.5], 1.0))
     with pytest.raises(ValueError, match=r"the law runs from 0\.0 to 1\.5"):
         compose(path, PiecewisePolynomial([0.0, 1.5], np.array([1.0, 0.0])[:, None, None]))
+
+
+@pytest.mark.parametrize("ends", [(1.0, 0.0), (0.0, 1.0), (1.0, 2.0), (2.0, 1.0)])
+def test_a_law_that_begins_or_ends_at_a_break_is_on_its_own_side_of_it(ends):
+    path = PiecewisePolynomial([0.0, 1.0, 2.0], np.array([[1.0, -3.0], [0.0, 1.0]])[:, :, None])
+    law = PiecewisePolynomial([0.0, 1.0], np.array([ends[1] - ends[0], ends[0]])[:, None, None])
+    t = np.linspace(0.05, 0.95, 7)
+    expected = np.interp(ends[0] + (ends[1] - ends[0]) * t, [0, 1, 2], [0, 1, -2])
+    np.testing.assert_allclose(compose(path, law).evaluate(t)[:, 0], expected, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(("beyond", "fits"), [(1e-12, True), (1e-7, False), (-1e-12, True), (-1e-7, False)])
+def test_a_law_may_leave_the_path_by_rounding_alone(beyond, fits):
+    path = PiecewisePolynomial([0.0, 1.0], np.ones((2, 1, 1)))
+    first, last = min(beyond, 0.0), 1.0 + max(beyond, 0.0)
+    law = PiecewisePolynomial([0.0, 1.0], np.array([last - first, first])[:, None, None])
+    if fits:
+        assert compose(path, law).end == 1.0
+        return
+    with pytest.raises(ValueError, match="the law runs from"):
+        compose(path, law)

@@ -170,3 +170,44 @@ def test_extension_never_shortens(extend):
 def test_joined_extension_evaluates_over_all():
     curve = concatenate([hold_until(constant([1.0], 1.0), 2.0), constant([1.0], 1.0)])
     assert curve.end == 3.0
+
+
+def test_curves_that_begin_at_different_times_do_not_merge():
+    late = PiecewisePolynomial([0.5, 1.0], np.ones((1, 1, 1)))
+    whole = PiecewisePolynomial([0.0, 1.0], np.ones((1, 1, 1)))
+    for curves in ([whole, late], [late, whole]):
+        with pytest.raises(ValueError, match=r"must all cover \[0\.0, 1\.0\]"):
+            merge_breaks(curves)
+
+
+def test_rounding_of_times_before_zero_is_that_of_the_earliest():
+    curves = [PiecewisePolynomial([-1000.0, -500.0 + apart, 0.0], np.ones((2, 2, 1))) for apart in (0, 1e-13)]
+    assert merge_breaks(curves).breaks.tolist() == [-1000.0, -500.0, 0.0]
+
+
+def test_breaks_a_last_bit_apart_stay_apart_in_scaled_and_reversed_time():
+    breaks = [0.0, 0.1, np.nextafter(0.1, 1), 1.9, np.nextafter(1.9, 2), 10.0]
+    curve = PiecewisePolynomial(breaks, np.ones((2, 5, 1)))
+    for other in (reverse(curve), scale_time(curve, 1.06)):
+        assert other.pieces == 5
+        assert (other.lengths > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("peaks", "rates", "moves"),
+    [
+        ([1.0], [1e-4], True),
+        ([1.0], [-1e-4], True),
+        ([1.0], [1e-12], False),
+        ([1e6, 1.0], [1e-5, 0.0], False),  # each by its own peak
+        ([1e3, 1.0], [0.0, 1e-7], True),
+    ],
+)
+def test_a_curve_rests_where_its_velocity_is_rounding(peaks, rates, moves):
+    coefficients = np.array([[peaks, rates], [np.zeros_like(peaks), peaks]])
+    curve = PiecewisePolynomial([0.0, 1.0, 2.0], coefficients)
+    if moves:
+        with pytest.raises(ValueError, match="still moves at its end"):
+            hold_until(curve, 3.0)
+    else:
+        assert hold_until(curve, 3.0).end == 3.0

@@ -299,13 +299,21 @@ def test_what_is_impossible_is_explained(fields: dict[str, float], match: str) -
     assert re.search(match, text), text
 
 
-def least_duration(distance: float, start: float, end: float, speed: float, rate: float) -> float:
-    """Return the duration that ruckig finds without a limit of jerk."""
+def least_duration(
+    distance: float,
+    start: float,
+    end: float,
+    speed: float,
+    rate: float,
+    lower: tuple[float, float] | None = None,
+) -> float:
+    """Return the duration that ruckig finds without a limit of jerk; `lower` has the limits below zero."""
     wanted, answer = ruckig.InputParameter(1), ruckig.Trajectory(1)
     wanted.current_position, wanted.target_position = [0.0], [distance]
     wanted.current_velocity, wanted.target_velocity = [start], [end]
     wanted.current_acceleration, wanted.target_acceleration = [0.0], [0.0]
     wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = [speed], [rate], [math.inf]
+    wanted.min_velocity, wanted.min_acceleration = ([low] for low in lower or (-speed, -rate))
     assert ruckig.Ruckig(1).calculate(wanted, answer) in (ruckig.Result.Working, ruckig.Result.Finished)
     return float(answer.duration)
 
@@ -331,3 +339,30 @@ def test_with_overshoot_it_is_the_fastest_of_all(seed: int) -> None:
     assert planned is not None
     least = least_duration(distance, start, end, speed, rate)
     assert planned.curve.duration == pytest.approx(least, rel=1e-7, abs=1e-7)
+
+
+@settings(max_examples=200, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_within_limits_that_differ_by_direction_it_is_the_fastest_of_all(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    velocity, acceleration = (np.array([-1, 1]) * rng.uniform(0.5, 5, 2) for _ in range(2))
+    start, end = rng.uniform(0.95 * velocity[0], 0.95 * velocity[1], 2).tolist()
+    distance = float(rng.normal() * 10 ** rng.uniform(-3, 0.5))
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": [velocity.tolist()], "acceleration": [acceleration.tolist()]},
+        "start": {"joints": [0], "velocity": [start]},
+        "moves": [
+            {"planner": "trapezoid", "to": {"joints": [distance], "velocity": [end]}, "overshoot": True}
+        ],
+    }
+    planned = plan_of(job)
+    assert planned is not None
+    least = least_duration(distance, start, end, velocity[1], acceleration[1], (velocity[0], acceleration[0]))
+    assert planned.curve.duration == pytest.approx(least, rel=1e-7, abs=1e-7)
+    t = np.linspace(0, planned.curve.end, 300)
+    for order, (low, high) in ((1, velocity), (2, acceleration)):
+        values = planned.curve.evaluate(t, order)
+        assert low * (1 + 1e-6) <= values.min()
+        assert values.max() <= high * (1 + 1e-6)

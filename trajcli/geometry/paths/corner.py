@@ -137,9 +137,11 @@ def round_corner(before: PositionCurve, after: PositionCurve, radius: float) -> 
         InputError: When the radius is not positive or too large for the curves.
         PlanningError: When the path turns back.
     """
-    room = room_for_radius(before, after)
-    if not 0.0 < radius <= room:
-        raise InputError(f"a corner radius of {radius:.6g} m does not fit: it must be in (0, {room:.6g}] m")
+    largest = room_for_radius(before, after)
+    if not 0.0 < radius <= largest:
+        raise InputError(
+            f"a corner radius of {radius:.6g} m does not fit: it must be in (0, {largest:.6g}] m"
+        )
     turn = turn_between(before, after)
     if turn > np.pi - REVERSAL:
         raise PlanningError(
@@ -195,8 +197,8 @@ def fitting_radii(
         for radius, kind, pair in zip(asked, kinds, pairwise(segments), strict=True)
     ]
     cut = _fitting(segments, wanted, [0.0] * len(asked))
-    rest = [radius if kind == "smooth" else 0.0 for radius, kind in zip(asked, kinds, strict=True)]
-    return cut, _fitting(segments, rest, cut)
+    fading = [radius if kind == "smooth" else 0.0 for radius, kind in zip(asked, kinds, strict=True)]
+    return cut, _fitting(segments, fading, cut)
 
 
 def room_for_radius(before: PositionCurve, after: PositionCurve) -> float:

@@ -105,15 +105,15 @@ def euler_interpolation(
     Raises:
         InputError: When the sequence is none, or the numbers of things do not fit.
     """
-    known = [
+    given = [
         None if row is None else np.asarray(row, dtype=np.float64) for row in typed or [None] * len(rotations)
     ]
-    if len(known) != len(rotations):
-        raise InputError(f"{len(rotations)} orientations and {len(known)} triples of angles do not fit")
-    anchor = max((n for n, row in enumerate(known) if row is not None), default=len(rotations) - 1)
+    if len(given) != len(rotations):
+        raise InputError(f"{len(rotations)} orientations and {len(given)} triples of angles do not fit")
+    anchor = max((n for n, row in enumerate(given) if row is not None), default=len(rotations) - 1)
     locked, angles = [], np.zeros((len(rotations), 3))
     for n in [*range(anchor, -1, -1), *range(anchor + 1, len(rotations))]:
-        row = known[n]
+        row = given[n]
         if row is None:
             aim = np.zeros(3) if n == anchor else angles[n + 1 if n < anchor else n - 1]
             row, is_locked = nearest_angles(rotations[n], sequence, frame, aim)

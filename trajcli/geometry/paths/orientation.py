@@ -321,10 +321,10 @@ class SegmentProgress:
     @property
     def breaks(self) -> Array:
         """Inner s, increasing, where a derivative of a fraction jumps."""
-        inner, room = self.borders[1:-1], _ROUNDING * self.length
+        inner, slack = self.borders[1:-1], _ROUNDING * self.length
         breaks = np.sort(np.concatenate([inner - self.half_widths, inner, inner + self.half_widths]))
-        breaks = breaks[(breaks > room) & (breaks < self.length - room)]  # a blend may begin at an end
-        return np.asarray(breaks[np.diff(breaks, prepend=-np.inf) > room])
+        breaks = breaks[(breaks > slack) & (breaks < self.length - slack)]  # a blend may begin at an end
+        return np.asarray(breaks[np.diff(breaks, prepend=-np.inf) > slack])
 
     def at(self, s: Array, side: Side = "right") -> SegmentFractions:
         """Return the fractions at s (N,).
