@@ -73,3 +73,82 @@ def test_the_unit_of_time_may_be_said_beside_that_of_angles(tmp_path, capfd):
     )
     assert "2 rad/s" in said.out, said.err
     assert said.code == 1
+
+
+SLIDE = """\
+version: 1
+units: {angle: deg, length: mm}
+robot: {joints: [{type: prismatic}, {}]}
+start: {joints: [-400, 10]}
+moves: [{planner: quintic, to: {joints: [100, 70]}, duration: 1}]
+output: {rate: 50, columns: [t, q, qd]}
+"""
+REACH = """\
+version: 1
+units: {angle: deg, length: mm}
+robot: planar2r
+start: {joints: [20, 60]}
+moves: [{planner: quintic, to: {joints: [40, 50]}, duration: 1}]
+output: {rate: 50, columns: [t, %s]}
+"""
+
+
+def planned_rows(tmp_path, capfd, job, name, *options):
+    """Plan a job, take the units from the names of a CSV, and return what `check` says of the rows."""
+    (tmp_path / "job.yaml").write_text(job)
+    assert call(capfd, "plan", tmp_path / "job.yaml", "-q", "-o", tmp_path / name).code == 0
+    if name.endswith(".csv"):
+        text = (tmp_path / name).read_text()
+        (tmp_path / name).write_text(text.replace("_mm", "").replace("_deg", ""))
+    said = call(capfd, "check", tmp_path / name, "--job", tmp_path / "job.yaml", "--json", *options)
+    return said, json.loads(said.out) if said.out else None
+
+
+@pytest.mark.parametrize(
+    ("name", "units", "planned"),
+    [
+        ("rows.csv", "deg,mm", True),
+        ("rows.csv", "rad,m", False),
+        ("rows.csv", "deg,mm,ms", False),
+        ("rows.jsonl", "rad,m", True),
+        ("rows.jsonl", "deg,mm", False),
+        ("rows.npy", "mm", False),
+        ("rows.mcap", "deg", False),
+    ],
+)
+def test_rows_are_those_of_a_plan_in_the_units_that_somebody_says(name, units, planned, tmp_path, capfd):
+    said, report = planned_rows(tmp_path, capfd, SLIDE, name, "--units", units)
+    assert (said.code, report["planned_rows"]) == (0 if planned else 1, planned)
+
+
+@pytest.mark.parametrize(("columns", "planned"), [("q1=q2,q2=q1,qd=none", False), ("q=q,qd=none", True)])
+def test_rows_are_those_of_a_plan_as_somebody_says_what_columns_are(columns, planned, tmp_path, capfd):
+    job = SLIDE.replace("type: prismatic", "").replace("mm}", "m}")
+    said, report = planned_rows(tmp_path, capfd, job, "rows.csv", "--units", "deg", "--columns", columns)
+    assert (said.code, report["planned_rows"]) == (0 if planned else 1, planned)
+    assert ("its column q1 is read as q2" in said.out) is not planned
+
+
+def test_rows_of_the_tool_are_read_in_the_units_that_somebody_says(tmp_path, capfd):
+    said, report = planned_rows(tmp_path, capfd, REACH % "pose", "rows.csv", "--units", "mm")
+    assert (said.code, report["planned_rows"]) == (0, True)
+    said, _ = planned_rows(tmp_path, capfd, REACH % "pose", "rows.csv")
+    assert (said.code, said.out) == (3, "")
+    assert "cannot reach the pose" in said.err
+    said, _ = planned_rows(tmp_path, capfd, REACH % "pose", "rows.csv", "--units", "mm,ms")
+    assert said.code == 2
+    assert "rows of the tool alone have their times in s, not ms" in said.err
+
+
+def test_columns_of_the_tool_beside_joints_have_the_units_that_somebody_says(tmp_path, capfd):
+    options = ("--units", "deg,mm", "--set", "moves.0.duration=2")
+    said, report = planned_rows(tmp_path, capfd, REACH % "q, pose", "rows.csv", *options)
+    assert (said.code, report["planned_rows"], report["findings"]) == (0, False, [])
+    assert "not read" not in said.out
+    text = (tmp_path / "rows.csv").read_text().splitlines()
+    cells = text[20].split(",")
+    text[20] = ",".join([*cells[:3], str(float(cells[3]) + 1), *cells[4:]])
+    (tmp_path / "rows.csv").write_text("\n".join(text) + "\n")
+    said = call(capfd, "check", tmp_path / "rows.csv", "--job", tmp_path / "job.yaml", "--json", *options)
+    (found,) = json.loads(said.out)["findings"]
+    assert (found["kind"], found["row"], found["value"]) == ("tool", 20, pytest.approx(1e-3, rel=1e-6))

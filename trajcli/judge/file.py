@@ -19,7 +19,7 @@ from trajcli.kinematics.robot import Robot
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of, refuse_job
 from trajcli.streams.recorded.column_roles import note_of_unread
-from trajcli.streams.recorded.column_units import parse_units
+from trajcli.streams.recorded.column_units import columns_said, parse_units
 from trajcli.streams.recorded_motion import MotionFile, RecordedMotion, motion_of, open_motion
 from trajcli.units import Quantity, Units, amount_text, joint_quantity
 
@@ -111,8 +111,6 @@ def check_file(
         InputError: When it is no motion, or options do not fit it or each other.
         FileError: When a file cannot be read.
     """
-    from trajcli.queries.arm import stated_units
-
     opened = source if isinstance(source, ByteSource) else ByteSource(source, _rate_of(options.rate))
     if plan is None and options.job is None and options.robot is None:
         refuse_job(opened)
@@ -122,8 +120,7 @@ def check_file(
         given, planned_with = _as_delivered(opened, given, options, delivered)
     given = _carrying(given, options)
     robot = given.robot
-    declared = None if plan is not None else stated_units(options.job or options.robot or "")
-    motion = _opened(opened, options, given, declared)
+    motion = _opened(opened, options, given, _declared(options))
     shown = _said_units(options, given.shown or given.units)
     consumer = _consumer_of(options.profile, given)
     requirements = _requirements(options, given, shown, consumer)
@@ -225,7 +222,8 @@ def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: 
     if given.plan is not None and not any(named):
         from trajcli.judge.rows.tool_rows import joints_found_back
 
-        found = joints_found_back(source, given.plan.loaded.robot_of_rows, given.plan)
+        said = parse_units(options.units)
+        found = joints_found_back(source, given.plan.loaded.robot_of_rows, given.plan, said)
         if found is not None:
             return motion_of(found, joints=joints, joint_types=types)
     return open_motion(
@@ -246,7 +244,17 @@ def _compared(source: ByteSource, given: _Given, options: CheckOptions) -> RowCo
         return None
     from trajcli.judge.rows.planned_rows import compare_with_plan
 
-    return compare_with_plan(source, given.plan, options.topic, options.field)
+    said, mapped = parse_units(options.units), options.columns is not None
+    read = _opened(source, options, given, _declared(options)).written_columns() if mapped else ()
+    return compare_with_plan(source, given.plan, options.topic, options.field, said, read)
+
+
+def _declared(options: CheckOptions) -> Units | None:
+    """Return the units that a file of the job or of the robot states, where one is named."""
+    from trajcli.queries.arm import stated_units
+
+    name = options.job or options.robot
+    return stated_units(name) if name else None
 
 
 def _beside_plan(judgement: Judgement, found: RowComparison | None, options: CheckOptions) -> Judgement:
@@ -282,10 +290,12 @@ def _of_tool_columns(
 
     joints = len(given.robot.joints)
     rows = open_rows_of(source, topic=options.topic, field=options.field, joints=joints)
-    table = open_tool_table(rows, JUDGED_ROWS)
+    said = parse_units(options.units)
+    table = open_tool_table(rows, JUDGED_ROWS, said)
     if table is None:
         return [], set()
-    read = {column.name for column in table.columns}
+    columns = zip(rows.named.names, columns_said(rows.named.names, said), strict=True)
+    read = {name for name, column in columns if column in table.columns}
     if planned:
         return [], read
     moves = () if given.plan is None else given.plan.moves

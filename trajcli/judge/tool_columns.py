@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import Column, group_of, kinds_of, parse_column
+from trajcli.columns import Column, group_of, kinds_of
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
 from trajcli.findings import Collector, Finding, at_time, tool_excess_amounts
@@ -30,6 +30,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import residuals
 from trajcli.kinematics.jacobian import jacobian_dot_qd, tcp_twist
 from trajcli.kinematics.robot import Joint, Robot, unlimited
+from trajcli.streams.recorded.column_units import SaidUnits, columns_said
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution, blocks_of_size
 from trajcli.streams.row_sources import ColumnExtents, RowSource
 
@@ -64,7 +65,7 @@ class ToolTable:
         return float(np.linalg.norm(self.halves[self.index(group)]))
 
 
-def open_tool_table(rows: RowSource, size: int) -> ToolTable | None:
+def open_tool_table(rows: RowSource, size: int, said: SaidUnits) -> ToolTable | None:
     """Return the columns about the tool of a file, whole groups; None where none says more than the joints.
 
     Joints that were integrated from velocities of the tool drift, and these are all that there is.
@@ -72,11 +73,12 @@ def open_tool_table(rows: RowSource, size: int) -> ToolTable | None:
     Args:
         rows: The file.
         size: Rows of a block.
+        said: Units of columns whose names say none.
 
     Raises:
         InputError: When a row is none.
     """
-    every = tuple(map(parse_column, rows.named.names))
+    every = columns_said(rows.named.names, said)
     kinds = {column.kind for column in every if column.joint is None and column.quantity is not None}
     whole = {group for group in ("pose", "twist", "twistd", "path") if {*kinds_of(group)} <= kinds}
     taken = [k for k, column in enumerate(every) if column.joint is None and group_of(column) in whole]

@@ -15,7 +15,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import GROUPS, Column, Group, columns_of, group_of, parse_column
+from trajcli.columns import GROUPS, Column, Group, columns_of, group_of
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import Grid, ListedGrid, UniformGrid
@@ -24,8 +24,9 @@ from trajcli.planning.plan import Plan
 from trajcli.samples import sample
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
+from trajcli.streams.recorded.column_units import SaidUnits, columns_said
 from trajcli.streams.recorded.stamp_period import simplest_between
-from trajcli.streams.recorded_motion import blocks_of_size
+from trajcli.streams.recorded_motion import WrittenColumn, blocks_of_size
 from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, ColumnExtents, RowSource, decimals_of_still
 from trajcli.units import Units
 
@@ -38,6 +39,7 @@ _NO_GRID = (
     "its stamps are neither all times of one rate, nor the times of the job, nor the knots of its motion"
 )
 _ODD = ("qd", "qddd", "vx", "vy", "vz", "wx", "wy", "wz", "sd")  # change their sign when time goes back
+_NONE_SAID = SaidUnits()
 _NANOSECOND = 0.5e-9  # s: by how much the stamps of messages are rounded
 
 
@@ -97,7 +99,12 @@ class _Rows:
 
 
 def compare_with_plan(
-    source: ByteSource, plan: Plan, topic: str | None = None, field: str | None = None
+    source: ByteSource,
+    plan: Plan,
+    topic: str | None = None,
+    field: str | None = None,
+    said: SaidUnits = _NONE_SAID,
+    read: Sequence[WrittenColumn] = (),
 ) -> RowComparison:
     """Return whether the rows of a file are those of a planned motion.
 
@@ -106,6 +113,8 @@ def compare_with_plan(
         plan: Of the job.
         topic: Of MCAP, the one that is read.
         field: Of messages with several states, the one that is read.
+        said: Units of columns whose names say none.
+        read: What columns are where somebody says it; the others are what their names say.
 
     Raises:
         InputError: When the file cannot be read as rows at all.
@@ -113,15 +122,19 @@ def compare_with_plan(
     """
     joints = len(plan.loaded.robot.joints)
     rows = open_rows_of(source, topic=topic, field=field, joints=joints)
-    columns = tuple(map(parse_column, rows.named.names))
-    found = _comparable(columns, rows.joint_names, plan)
+    columns = columns_said(rows.named.names, said, plan.loaded.robot.joint_types)
+    found = _read_otherwise(columns, rows.named.names, read, said) or _comparable(
+        columns, rows.joint_names, plan
+    )
     if isinstance(found, str):
         return RowComparison(planned=False, difference=found)
     groups, index = found
     kept, stamps, halves = _read(rows, columns)
     if stamps is None:
         return RowComparison(planned=False, difference="its time stamps do not increase from row to row")
-    factors = np.array([column.factor for column in columns])
+    mapped = {column.name: column.factor for column in read}
+    named = zip(rows.named.names, columns, strict=True)
+    factors = np.array([mapped.get(name, column.factor) for name, column in named])
     of_file = _Rows(rows, columns, factors, groups, index, kept)
     difference = None
     for grid in _grids(plan, stamps):
@@ -161,6 +174,21 @@ def _comparable(
         return "its columns are about a tool, and the robot has no geometry"
     index = np.array([where[column.kind, column.joint] for column in columns], dtype=np.intp)
     return tuple(groups), index
+
+
+def _read_otherwise(
+    columns: Sequence[Column], names: Sequence[str], read: Sequence[WrittenColumn], said: SaidUnits
+) -> str | None:
+    """Return what column somebody takes for another than its name says; stamps of `plan` are in seconds."""
+    otherwise = {column.name: column for column in read}
+    for name, column in zip(names, columns, strict=True):
+        other = otherwise.get(name)
+        if column.kind == "t" and (said.time not in (None, "s") or (other and other.factor != 1.0)):
+            return f"its column {name} is not read in s"
+        if other is not None and (other.quantity, other.joint) != (column.kind, column.joint):
+            what = other.quantity if other.joint is None else f"{other.quantity}{other.joint + 1}"
+            return f"its column {name} is read as {what}"
+    return None
 
 
 def _read(rows: RowSource, columns: Sequence[Column]) -> tuple[Array | None, _Stamps | None, Array]:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import Column, kinds_of, parse_column
+from trajcli.columns import Column, kinds_of
 from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
@@ -28,12 +28,14 @@ from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_roles import NamedFile
+from trajcli.streams.recorded.column_units import SaidUnits, columns_said
 from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, unplaced
 from trajcli.streams.table import TableBlocks
 from trajcli.units import Units
 
 _TOLERANCE = 1e-6  # m and rad: what the answers may miss of rounded poses
 _REGULAR = 1e3  # largest over smallest singular value: beyond it rates of the tool do not tell the joints'
+_NONE_SAID = SaidUnits()
 _LOST = 1  # decimals of a pose, or of s, that its joints do not have
 _RATES_LOST = 3  # likewise of rates of the tool
 _SAME_DURATION = 1e-6  # s: a file that lasts as long as the plan, within that, has its moves
@@ -98,13 +100,16 @@ class _Found:
     note: str
 
 
-def joints_found_back(source: ByteSource, robot: Robot, plan: Plan) -> ArrayRows | None:
+def joints_found_back(
+    source: ByteSource, robot: Robot, plan: Plan, said: SaidUnits = _NONE_SAID
+) -> ArrayRows | None:
     """Return rows of joints that move the tool as a file says; None where it has joints, or none.
 
     Args:
         source: The file.
         robot: Whose tool it is, as it stands in the frame of the rows.
         plan: Of the job: the joints from which the first row is reached, and the paths of its moves.
+        said: Units of columns whose names say none.
 
     Raises:
         InputError: When the file cannot be read as rows, or nothing says of which move a row is.
@@ -113,12 +118,14 @@ def joints_found_back(source: ByteSource, robot: Robot, plan: Plan) -> ArrayRows
     if robot.convention is None:
         return None
     rows = open_rows_of(source)
-    columns = tuple(map(parse_column, rows.named.names))
+    columns = columns_said(rows.named.names, said)
     kinds = {column.kind for column in columns}
     groups = [group for group in ("pose", "twist", "path") if {*kinds_of(group)} <= kinds]
     placed = {"x", "y", "z"} <= kinds
     if any(column.joint is not None for column in columns) or "t" not in kinds or not (groups or placed):
         return None
+    if said.time not in (None, "s"):
+        raise InputError(f"{rows.named.file}: rows of the tool alone have their times in s, not {said.time}")
     of_tool = _ToolRows(rows, columns, np.concatenate(list(rows.blocks(range(len(columns)), ()))))
     start, arms = plan.trajectory.start.position, ArmsOfMoves(robot, plan.moves)
     moves = _moves_of(of_tool, plan).astype(np.int64) if arms.changes else None
@@ -164,7 +171,8 @@ def _of_poses(of_tool: _ToolRows, arms: ArmsOfMoves, moves: Moves, start: Array)
 
     named = of_tool.rows.named
     values = of_tool.values if moves is None else _with_first_tool(of_tool, arms, moves)
-    poses = TableBlocks(named.names, iter([values]), named.file)
+    names = tuple(column.name for column in of_tool.columns)
+    poses = TableBlocks(names, iter([values]), named.file)
     stream = joints_of(ArmInUnits(arms.own, Units()), poses, start, _TOLERANCE)
     q = np.concatenate(list(stream.blocks))[:, 1:]
     slopes = arms.values(len(q), moves, lambda arm, k: jacobian(arm, q[k]))

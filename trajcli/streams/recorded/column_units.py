@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
-from trajcli.columns import GROUPS, JOINT_ORDERS, group_of, parse_column
+from trajcli.columns import GROUPS, JOINT_ORDERS, Column, group_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
@@ -16,7 +17,17 @@ from trajcli.kinematics.robot import JointType
 from trajcli.streams.recorded.column_names import ColumnName
 from trajcli.streams.recorded.column_roles import ColumnRoles, NamedFile
 from trajcli.suggest import did_you_mean
-from trajcli.units import AngleUnit, Dimension, LengthUnit, Quantity, UnitError, Units, factor, parse_quantity
+from trajcli.units import (
+    AngleUnit,
+    Dimension,
+    LengthUnit,
+    Quantity,
+    UnitError,
+    Units,
+    factor,
+    joint_quantity,
+    parse_quantity,
+)
 
 _PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _RATES = ("", "/s", "/s^2", "/s^3")
@@ -67,6 +78,27 @@ def parse_units(units: str | Units | None) -> SaidUnits:
         cast("LengthUnit | None", said.get("length")),
         said.get("time"),
     )
+
+
+def columns_said(
+    names: Sequence[str], said: SaidUnits, joint_types: Sequence[JointType] = ()
+) -> tuple[Column, ...]:
+    """Return what columns of trajcli's own names hold; those that name no unit have the one that is said.
+
+    Args:
+        names: Of the columns.
+        said: What somebody says.
+        joint_types: Of the joints whose columns are meant, too.
+    """
+    found = []
+    for column in map(parse_column, names):
+        quantity, joint = column.quantity, column.joint
+        if joint is not None and joint < len(joint_types) and column.kind in JOINT_ORDERS:
+            quantity = joint_quantity(joint_types[joint], JOINT_ORDERS[column.kind])
+        dimension = None if column.unit or quantity is None else quantity.dimension
+        unit = {"angle": said.angle, "length": said.length}.get(dimension or "")
+        found.append(replace(column, unit=unit) if unit in ("deg", "mm") else column)
+    return tuple(found)
 
 
 def is_own_language(names: Sequence[str]) -> bool:
