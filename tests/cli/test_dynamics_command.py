@@ -84,6 +84,22 @@ def test_another_base_and_tool(arms, arm):
     assert told[1] - bare[1] == pytest.approx(2 * G * 0.5, rel=1e-12)
 
 
+def test_the_tool_of_a_job_weighs_where_it_is_and_nothing_where_another_one_is(arms, arm, tmp_path):
+    job = tmp_path / "job.yaml"
+    job.write_text(
+        "version: 1\nunits: {angle: deg, length: mm}\nrobot: {file: arm.yaml}\n"
+        "tools: {gripper: {xyz: [100, 0, 0], mass: 2, com: [-40, 0, 0]}}\ntool: gripper\n"
+        "start: {joints: [0, 0]}\nmoves: [{planner: hold, duration: 1}]\n"
+    )
+    bare, mounted = (arms.json("dynamics", "-r", name, 0, 0)["gravity"] for name in (arm, job))
+    assert mounted[1] - bare[1] == pytest.approx(2 * G * 0.46, rel=1e-12)
+    other = arms.json("dynamics", "-r", job, "--tool", "{xyz: [300, 0, 0]}", 0, 0)["gravity"]
+    assert other == pytest.approx(bare, rel=1e-12)
+    carried = ("--tool", "{xyz: [300, 0, 0]}", "--payload", "{mass: 1}")
+    loaded = arms.json("dynamics", "-r", job, *carried, 0, 0)["gravity"]
+    assert loaded[1] - bare[1] == pytest.approx(G * 0.7, rel=1e-12)
+
+
 def test_rows_become_rows_of_efforts(arms, arm):
     states = [((20, 50), (30, -70), (200, 100)), ((-10, 5), (0, 3), (1, -2))]
     lines = ["t,q1_deg,q2_deg,qd1_deg,qd2_deg,qdd1_deg,qdd2_deg"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -17,7 +16,7 @@ from trajcli.frozen import comparable, frozen
 from trajcli.job.robot import RobotSheet, is_urdf, load_sheet
 from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.inverse.joint_turns import beyond
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import MountedTool, Robot
 from trajcli.kinematics.serial_chain import links_of
 from trajcli.streams.whole_file import kind_of
 from trajcli.units import (
@@ -229,8 +228,8 @@ def open_arm(
     if tool is not None or base is not None:
         from trajcli.job.inline import inline_pose
 
-        own = robot.tool if tool is None else inline_pose(tool, "--tool", shown)
-        robot = replace(robot, tool=own)
+        if tool is not None:  # what the other tool weighs goes with it
+            robot = robot.with_tool(MountedTool(inline_pose(tool, "--tool", shown)))
         robot = robot if base is None else robot.standing_at(inline_pose(base, "--base", shown))
     return ArmInUnits(robot.standing_at(np.eye(4)) if frame == "base" else robot, shown)
 
