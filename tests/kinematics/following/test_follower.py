@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from scipy.linalg import null_space
 from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.kinematics.following.follower import LostError, follower
+from trajcli.kinematics.following.follower import LostError, aspect_of, follower
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
 
@@ -107,6 +108,9 @@ def test_a_guess_on_no_branch_is_lost_with_its_place():
     with pytest.raises(LostError) as caught:
         arm.exact(s, "right", guess)
     np.testing.assert_array_equal(caught.value.s, [0.02, 0.03])
+    with pytest.raises(LostError) as alone:
+        arm.exact(s[2:], "right", guess[2:])
+    np.testing.assert_allclose(caught.value.joints, alone.value.joints, rtol=0, atol=1e-9)
     assert caught.value.joints.shape == (6,)
 
 
@@ -140,6 +144,17 @@ def test_the_other_branch_is_no_answer():
     assert arm.exact(np.zeros(1), "right", made.start[None])[0, 0] == pytest.approx(made.start)
     with pytest.raises(LostError):
         arm.exact(np.zeros(1), "right", mirror[None])
+    ahead = arm.exact(np.array([1e-3]), "right", made.start[None])[0]
+    for order in ([0, 1], [1, 0]):
+        places, guesses = np.array([1e-3, 0.0])[order], np.stack([ahead[0], mirror])[order]
+        with pytest.raises(LostError) as caught:  # one of two is enough, and it is the one that is told
+            arm.exact(places, "right", guesses)
+        assert caught.value.s.tolist() == [0.0]
+        assert caught.value.joints == pytest.approx(mirror)
+    with pytest.raises(LostError) as caught:
+        arm.exact(np.array([1e-3, 0.0]), "right", np.stack([mirror, mirror]))
+    assert caught.value.s.tolist() == [0.0, 1e-3]
+    assert caught.value.joints == pytest.approx(mirror, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["puma560, direction", "ur5e, direction of x", "panda, direction"])
@@ -155,3 +170,59 @@ def test_a_direction_has_a_hand_too(name):
 def test_a_singular_start_has_no_hand():
     made = case("puma560", [0.2, 0.7, -0.8, 0.4, 0.0, -0.3])
     assert followed(made).aspect.sign == 0.0
+
+
+def test_joint_values_that_are_a_quarter_of_a_radian_from_the_guess_are_another_branch():
+    made = CASES["ur5e, pose"]
+    arm = followed(made)
+    for off_by, fits in ((0.2, True), (-0.2, True), (0.27, False), (-0.27, False)):
+        guess = made.start + off_by * np.eye(6)[5]
+        if fits:
+            assert arm.exact(np.zeros(1), "right", guess[None])[0, 0] == pytest.approx(made.start, abs=1e-9)
+        else:
+            with pytest.raises(LostError) as caught:
+                arm.exact(np.zeros(1), "right", guess[None])
+            assert caught.value.joints == pytest.approx(made.start, abs=1e-6)
+
+
+def test_an_orientation_that_is_missed_alone_is_lost():
+    made = case("cartesian", [0.3, 0.2, 0.4], turn=(0.01, 0.0, 0.0))
+    with pytest.raises(LostError) as caught:
+        followed(made).exact(np.array([made.path.length]), "right", made.start[None] + 0.05)
+    assert caught.value.missed == pytest.approx((0.0, 0.01), abs=1e-9)
+
+
+@pytest.mark.parametrize("beyond", [1e-3, 1e-6, -1e-6])
+def test_a_little_out_of_reach_is_lost_too(beyond):
+    """An arm that is stretched along x, or against it, and a tool that goes on."""
+    made = case("planar3r", [0.0 if beyond > 0.0 else np.pi, 0.0, 0.0], "yaw", "x")
+    arm = followed(made)
+    outwards = arm.reference_at
+
+    def further(s, side):
+        reference = outwards(np.zeros_like(s), side)
+        reference.poses[:, 0, 3] += beyond
+        return reference
+
+    with pytest.raises(LostError) as caught:
+        type(arm)(arm.robot, further, arm.start, arm.held).exact(np.zeros(1), "right", made.start[None])
+    assert caught.value.missed[0] == pytest.approx(abs(beyond), rel=0.5)
+
+
+def test_the_aspect_of_dependent_rows_is_told_where_they_span_the_same_space():
+    """Rows of a plane arm with a third that no joint changes: their mirror image is the other aspect."""
+    reference, poses = SimpleNamespace(orientation="none"), np.eye(4)[None]
+    rows = np.array([[[1.0, 0.2], [0.3, 1.0], [0.0, 0.0]]])
+    aspect = aspect_of(reference, poses, rows)
+    assert abs(aspect.sign) == 1.0
+    mirrored, other = rows * [[1.0], [-1.0], [1.0]], rows[:, [0, 2, 1]]
+    tilted = np.array([[[1.0, 0.2], [-0.3, -1.0], [-0.5, -0.5]]])
+    for changed, expected in (
+        (rows, False),
+        (2 * rows, False),
+        (mirrored, True),
+        (other, False),
+        (tilted, False),
+    ):
+        assert aspect.changed(reference, poses, changed).tolist() == [expected]
+    assert aspect_of(reference, poses, rows * [[1.0], [0.0], [0.0]]).sign == 0.0

@@ -100,3 +100,40 @@ def test_two_segments_have_their_angles_one_after_the_other():
     path = ToolPath(poses, (True, True, True), "yaw", "x", (0.5, -0.2), progress)
     headings = path.at_s(np.array([0.0, 0.15, 0.3, 0.5, 0.7]), "right").aims[:, 0]
     assert headings == pytest.approx([0.0, 0.25, 0.5, 0.4, 0.3])
+
+
+def test_headings_that_fade_into_each_other_have_the_rates_of_differences():
+    progress = SegmentProgress(np.array([0.0, 0.3, 0.7]), np.array([0.1]))
+    path = replace(chain(), orientation="yaw", tool_axis="x", angle_changes=(0.5, -0.2), progress=progress)
+    states = np.array([[0.0, 0.25, 0.7], [0.0, 0.4, 0.0], [0.0, 0.1, 0.0]])[:, :, None]
+    law = hermite_pieces(np.array([0.0, 0.8, 2.0]), states)
+    times, step = np.array([0.7, 0.9, 1.0, 1.7]), 1e-4
+    crossings = path.crossings(law, law.breaks)
+    at = [path.at_time(law, times + shift, "right", crossings) for shift in (-step, 0.0, step)]
+    for order in (0, 1):
+        slope = (at[2].aims[:, order] - at[0].aims[:, order]) / (2 * step)
+        assert at[1].aims[:, order + 1] == pytest.approx(slope, abs=1e-5)
+    assert np.abs(at[1].aims[:3, 2]).min() > 0.1
+
+
+def test_a_law_whose_break_is_shortly_before_a_corner_passes_it_when_it_does():
+    """A break of its own that is a ten-thousandth of the duration away is another time."""
+    path = chain()
+    for early in (1e-4, -1e-4, 1e-6):
+        states = np.array([[0.0, 0.3 - 0.35 * early, 0.7], [0.0, 0.35, 0.0], [0.0, 0.0, 0.0]])[:, :, None]
+        law = hermite_pieces(np.array([0.0, 1.0, 2.0]), states)
+        (when,) = path.crossings(law, law.breaks)
+        assert when == pytest.approx(1.0 + early, abs=1e-8)
+        assert law.evaluate(np.array([when]))[0, 0] == pytest.approx(0.3, abs=1e-13)
+
+
+def test_beside_a_stop_the_tool_is_where_the_law_is():
+    states = np.array([[0.0, 0.3, 0.7], [0, 0, 0], [0, 0, 0]], dtype=float)[:, :, None]
+    law, path = hermite_pieces(np.array([0.0, 1.0, 2.0]), states), chain()
+    times = np.array([0.9, 0.999, 1.0, 1.001, 1.1])
+    crossings = path.crossings(law, law.breaks)
+    assert crossings.tolist() == [1.0]
+    s = law.evaluate(times)[:, 0]
+    expected = np.stack([np.minimum(s, 0.3), np.maximum(s - 0.3, 0.0)], axis=1)
+    for side in ("left", "right"):
+        assert path.at_time(law, times, side, crossings).poses[:, :2, 3] == pytest.approx(expected, abs=1e-12)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from trajcli.errors import PlanningError
 from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.chain import join
-from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation
+from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation, SegmentProgress
 from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.weave import Weave, stops_of
 
@@ -20,8 +20,9 @@ LINE = Line([0.1, 0.2, 0.3], [0.3, 0.15, 0.35])
 ARC = Arc.through([0.4, 0.0, 0.3], [0.45, 0.07, 0.32], [0.4, 0.15, 0.3])
 HELIX = Arc([0.4, 0.0, 0.3], [0.3, 0.0, 0.3], [0.0, 0.0, 1.0], 2.5, 0.05)
 ROUNDED = join([Line([0, 0, 0], [0.1, 0, 0]), Line([0.1, 0, 0], [0.12, 0.1, 0.02])], 0.03)
+INTO_ARC = join([Line([0, 0, 0], [0.1, 0, 0]), Arc([0.1, 0, 0], [0.06, 0.06, 0], [0, 0, 1], 1.2)], 0.02)
 SHARP = join([Line([0, 0, 0], [0.12, 0, 0]), Line([0.12, 0, 0], [0.12, 0.08, 0.0])])
-SEAMS = {"line": LINE, "arc": ARC, "helix": HELIX, "rounded": ROUNDED}
+SEAMS = {"line": LINE, "arc": ARC, "helix": HELIX, "rounded": ROUNDED, "into an arc": INTO_ARC}
 TILTED = Rotation.from_euler("xyz", [2.8, 0.2, 0.4]).as_matrix()
 
 
@@ -30,15 +31,23 @@ def turning(length):
     return AxisAngleOrientation.between(TILTED, last, length)
 
 
+def fading(length):
+    """Return a rotation that fades into another one about the middle."""
+    rotations = np.stack([TILTED, turning(length).evaluate(np.array([length]))[0][0], TILTED.T])
+    progress = SegmentProgress(length * np.array([0.0, 0.5, 1.0]), np.array([0.3 * length]))
+    return AxisAngleOrientation(rotations, progress)
+
+
 def weave_of(name, shape, across=None, cycles=7.5):
     seam = SEAMS[name]
-    return Weave(seam, turning(seam.length), A, (cycles,), shape, across)
+    tool = fading(seam.length) if name == "line" else turning(seam.length)
+    return Weave(seam, tool, A, (cycles,), shape, across)
 
 
 def places(weave):
     """Return s away from breaks, where the curve is smooth."""
     s = np.linspace(0.0, weave.length, 97)[1:-1]
-    edges = np.concatenate([[0.0], weave.breaks, [weave.length]])
+    edges = np.concatenate([[0.0], weave.breaks, weave.orientation.breaks, [weave.length]])
     return s[np.abs(s[:, None] - edges).min(axis=1) > 1e-4 * weave.length]
 
 
@@ -96,10 +105,11 @@ def test_a_side_that_is_given_is_taken_square_to_the_seam_whatever_its_length():
     assert weave.evaluate(s)[0] == pytest.approx(expected, abs=1e-14)
 
 
-@pytest.mark.parametrize("name", ["line", "rounded"])
+@pytest.mark.parametrize("name", ["line", "rounded", "into an arc"])
 @pytest.mark.parametrize("shape", ["sine", "triangle", "trapezoid"])
 def test_it_breaks_where_it_is_steepest_or_bends_and_both_sides_meet_there(name, shape):
-    weave = weave_of(name, shape, cycles=2.5)
+    cycles = 60.5 if name == "line" else 2.5
+    weave = weave_of(name, shape, cycles=cycles)
     for order in (0, 1, 2):
         left, right = (weave.evaluate(weave.breaks, side)[order] for side in ("left", "right"))
         assert left == pytest.approx(right, abs=1e-7 * np.abs(left).max())
@@ -107,8 +117,8 @@ def test_it_breaks_where_it_is_steepest_or_bends_and_both_sides_meet_there(name,
         phases = {"sine": [0.0, 0.25, 0.5, 0.75]}.get(shape)
         corners = {"triangle": (0.25, 0.75), "trapezoid": (0.125, 0.375, 0.625, 0.875)}.get(shape, ())
         phases = phases or [0.0, *(c + part for c in corners for part in (-0.025, 0.0, 0.025))]
-        wanted = np.sort([k + phase for k in range(3) for phase in phases if 0.0 < k + phase < 2.5])
-        assert weave.breaks == pytest.approx(wanted / 2.5 * weave.length, abs=1e-12)
+        wanted = np.sort([k + phase for k in range(61) for phase in phases if 0.0 < k + phase < cycles])
+        assert weave.breaks == pytest.approx(wanted / cycles * weave.length, abs=1e-12)
 
 
 def test_between_stops_each_part_has_its_own_cycles_and_begins_on_the_seam():
@@ -121,10 +131,19 @@ def test_between_stops_each_part_has_its_own_cycles_and_begins_on_the_seam():
         offset = p[:, across] - (0.12 if across == 0 else 0.0)
         wave = A * np.sin(2 * np.pi * cycles * (s - low) / (high - low))
         assert offset == pytest.approx(wave if along == 0 else -wave, abs=1e-14)
+    quarters = [*(0.12 * np.arange(1, 12) / 12), 0.12, *(0.12 + 0.08 * np.arange(1, 10) / 10)]
+    assert weave.breaks == pytest.approx(np.array(quarters), abs=1e-12)
     left, right = (weave.evaluate(np.array([0.12]), side) for side in ("left", "right"))
     assert left[0] == pytest.approx(right[0], abs=1e-15)
     assert left[1][0] == pytest.approx([1.0, 2 * np.pi * A * 3.0 / 0.12, 0.0])
     assert right[1][0] == pytest.approx([-2 * np.pi * A * 2.5 / 0.08, 1.0, 0.0])
+
+
+def test_it_stops_where_a_line_goes_over_into_an_arc():
+    """The direction goes on there, and the curvature does not: nor does the acceleration of the swing."""
+    seam = join([Line([0, 0, 0], [0.1, 0, 0]), Arc([0.1, 0, 0], [0.1, 0.05, 0], [0, 0, 1], 1.2)])
+    assert stops_of(seam).tolist() == [0.1]
+    assert stops_of(ROUNDED).tolist() == stops_of(LINE).tolist() == []
 
 
 @pytest.mark.parametrize(("tilt", "fits"), [(0.09, False), (0.11, True), (-0.09, False), (-0.11, True)])
@@ -141,27 +160,35 @@ def test_a_side_needs_a_tenth_of_its_length_square_to_the_seam(tilt, fits):
             made(seam, across)
 
 
-def test_where_the_side_is_along_an_arc_is_told():
-    """An arc from heading 0 to 90 deg: the side across it at the start is along it where it heads there."""
-    arc = Arc([0.0, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 1.0], np.pi / 2)
+@pytest.mark.parametrize("heading", [45.0, 30.0])
+def test_where_the_side_is_along_an_arc_is_told(heading):
+    """An arc that heads from -x to -y: the side is along it where it heads there, to a 32nd of its length."""
+    arc = Arc([0.0, 0.1, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0], np.pi / 2)
+    side = np.array([np.cos(np.radians(heading)), np.sin(np.radians(heading)), 0.0])
     with pytest.raises(PlanningError, match="`side` is along it") as caught:
-        Weave(arc, turning(arc.length), A, (4.0,), "sine", np.array([1.0, 1.0, 0.0]))
+        Weave(arc, turning(arc.length), A, (4.0,), "sine", side)
     (problem,) = caught.value.problems
-    assert problem.amounts["s"].value == pytest.approx(arc.length / 2, rel=1e-6)
+    assert problem.amounts["s"].value == pytest.approx(arc.length * heading / 90, abs=arc.length / 64 + 1e-9)
 
 
 @pytest.mark.parametrize("shape", ["sine", "triangle", "trapezoid"])
-@pytest.mark.parametrize("straight", [True, False])
-def test_bounds_of_its_derivatives_are_above_differences_and_not_far(shape, straight):
+@pytest.mark.parametrize("about", ["line", "line and side", "turning tool", "late", "arc"])
+def test_bounds_of_its_derivatives_are_above_differences_and_not_far(shape, about):
     """Of p over an interval of s that rises evenly: order m bounds |p^(m)| / m! times its length^m."""
-    seam = LINE if straight else ARC
-    weave = Weave(seam, FixedOrientation(TILTED, seam.length), A, (6.0,), shape)
+    seam = ARC if about == "arc" else LINE
+    fixed = FixedOrientation(TILTED, seam.length) if about in ("line", "arc") else turning(seam.length)
+    if about == "late":  # it turns in the second half alone
+        rotations = np.stack([TILTED, TILTED, TILTED.T])
+        halves = SegmentProgress(seam.length * np.array([0.0, 0.5, 1.0]), np.zeros(1))
+        fixed = AxisAngleOrientation(rotations, halves)
+    across = np.array([0.1, 0.2, 2.0]) if about == "line and side" else None
+    weave = Weave(seam, fixed, A, (6.0,), shape, across)
     edges = np.concatenate([[0.0], weave.breaks, [weave.length]])
     lengths = np.diff(edges)
     rising = np.zeros((4, lengths.size))
     rising[1] = lengths
     bound = weave.majorants(edges[:-1] + 0.5 * lengths, rising)[0]
-    if not straight:
+    if about in ("arc", "turning tool", "late"):  # where nothing is known of the side
         assert np.isinf(bound).all()
         return
     for k, (low, high) in enumerate(pairwise(edges)):

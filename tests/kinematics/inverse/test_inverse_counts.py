@@ -20,7 +20,7 @@ from shutil import which
 import numpy as np
 import polynomial_answers as polynomials
 import pytest
-from inverse_arms import FAMILIES, arm, gap, random_joints
+from inverse_arms import FAMILIES, WRIST, arm, gap, random_joints
 
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solve import solve
@@ -258,3 +258,39 @@ def test_an_aim_that_is_too_near_for_a_slide_is_missed_by_what_lies_between():
     found = solve(robot, partial_target(forward(robot, joints)[:3, 3] - 0.6 * away))
     assert not found.valid.any()
     assert found.shortfall[0] == pytest.approx(0.6 * np.linalg.norm(away), rel=1e-9)
+
+
+@pytest.mark.parametrize(("theta", "alpha"), [(0.7, 1.0), (-0.2, 0.6)])
+def test_an_axis_of_roll_may_stand_anywhere(monkeypatch, theta, alpha):
+    """Not only ahead of the arm, or at right angles to the three parallel axes."""
+    rows = list(FAMILIES["elbow, pitch and roll"][0])
+    rows[3] = f"R {theta} .02 .03 {alpha}"
+    monkeypatch.setitem(FAMILIES, "askew", (rows, 4, "elbow, pitch and roll"))
+    check("askew", "pose", 20, by_polynomials)
+
+
+LIKE_OTHERS = {  # what keeps them from being of a family is one axis
+    "4R whose last axis is turned": ["R 0 .3 .1 1", "R 0 .05 .3 0", "R 0 0 .25 .5", "R .4 .02 .1 0"],
+    "5R whose fourth axis is turned": [
+        *FAMILIES["elbow, pitch and roll"][0][:2],
+        "R 0 0 .25 .4",
+        "R 1 .02 .03 1",
+        WRIST[2],
+    ],
+    "4R and a slide": [*FAMILIES["elbow, pitch and roll"][0][:4], "P 0 .15 .04 .3"],
+    "slide across a slanted plane": ["R 0 0 0 .7", "P 0 0 0 -.7", "R 0 0 .2 0"],
+    "RP slanted": ["R .2 0 0 .7", "P 0 0 .1 0"],
+    "two slides along one axis": ["P 0 .1 0 0", "R 0 0 .3 0", "R 0 0 .2 0", "R 0 0 .1 .5"],
+    "UR whose wrist does not meet": [*FAMILIES["UR"][0][:4], "R 0 .1 .05 -1", "R 0 .1 0 0"],
+    "wrist with a slide": [*FAMILIES["wrist over elbow"][0][:3], *WRIST[:2], "P 0 .1 0 0"],
+}
+
+
+@pytest.mark.parametrize("name", LIKE_OTHERS)
+def test_arms_that_are_like_those_of_a_family_are_solved_where_they_stand(monkeypatch, name):
+    monkeypatch.setitem(FAMILIES, name, (LIKE_OTHERS[name], 0, ""))
+    robot = arm(name, np.random.default_rng(3))
+    joints = random_joints(robot, np.random.default_rng(4), 1)
+    poses = forward(robot, joints)
+    found = solve(robot, poses, joints)
+    assert np.where(found.valid, gap(robot, found.joints, joints[:, None]), np.inf).min(axis=1).max() < 1e-6

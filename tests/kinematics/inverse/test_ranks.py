@@ -7,11 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from inverse_arms import arm
+from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solve import solve
-from trajcli.kinematics.inverse.target import determinants, partial_target, pose_target, ranks, residuals
+from trajcli.kinematics.inverse.target import (
+    determinants,
+    partial_target,
+    pose_target,
+    ranks,
+    residual_jacobian,
+    residuals,
+)
 from trajcli.kinematics.jacobian import jacobian
 
 PLANE = replace(arm("planar 2R"), joints=tuple(replace(j, theta=0.0) for j in arm("planar 2R").joints))
@@ -44,14 +52,42 @@ def test_the_determinant_of_a_plane_arm_is_that_of_the_textbook(base):
 
 
 def test_a_direction_has_no_determinant():
-    assert (
-        of(
-            arm("elbow, pitch and roll"),
-            np.ones((1, 5)),
-            partial_target([[0, 0, 0.0]], direction=[[0, 0, 1.0]]),
-        )
-        is None
-    )
+    """Its three rows are two, and with those of the position they are as many as the joints of a UR."""
+    assert of(arm("UR"), np.ones((1, 6)), partial_target([[0, 0, 0.0]], direction=[[0, 0, 1.0]])) is None
+    whole = of(arm("UR"), np.ones((1, 6)), pose_target(np.eye(4)[None]))
+    assert whole == pytest.approx(np.linalg.det(jacobian(arm("UR"), np.ones((1, 6)))))
+
+
+def test_a_target_fixes_so_many_coordinates():
+    position, other = [0.1, 0.2, 0.3], {"rotation": np.eye(3)}
+    kinds = {"direction": ([0, 0, 1.0], 2), "yaw": (0.1, 1), "pitch": (0.1, 1)}
+    for kind, (value, count) in kinds.items():
+        assert partial_target(**{kind: value}).coordinates == count
+        assert partial_target(position, fixed=(True, False, True), **{kind: value}).coordinates == count + 2
+    assert partial_target(position, **other).coordinates == 6
+    assert partial_target(position, **other).whole
+    assert not partial_target(position, fixed=(True, True, False), **other).whole
+    assert not partial_target(**other).whole
+    assert not partial_target(position).whole
+
+
+@pytest.mark.parametrize("steep", [0.02, 0.06, 0.5, -0.02])
+@pytest.mark.parametrize("kind", ["yaw", "pitch"])
+def test_rates_of_headings_and_elevations_of_a_steep_axis_are_differences(kind, steep):
+    """Of three joints that turn the tool about x, y and z of the world."""
+    pose, step = np.eye(4)[None].copy(), 1e-6
+    pose[0, :3, :3] = Rotation.from_euler("ZYX", [0.7, np.pi / 2 - steep, 0.3]).as_matrix()
+    columns = np.zeros((1, 6, 3))
+    columns[0, 3:] = np.eye(3)
+    target = partial_target(tool_axis="x", **{kind: np.array([0.1])})
+    slopes = residual_jacobian(target, pose, columns)[0, 0]
+    for k, unit in enumerate(np.eye(3)):
+        ends = []
+        for sign in (-1, 1):
+            turned = pose.copy()
+            turned[0, :3, :3] = Rotation.from_rotvec(sign * step * unit).as_matrix() @ pose[0, :3, :3]
+            ends.append(residuals(target, turned)[0, 0])
+        assert slopes[k] == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=1e-6 / steep**2)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +144,7 @@ def test_the_steepest_pitch_is_the_one_that_is_refused(pitch):
 
 
 @pytest.mark.parametrize(
-    "axis", np.vstack([np.eye(3), -np.eye(3), [[0.6, 0.8, 0.0], [-0.6, 0.0, 0.8]]]).tolist()
+    "axis", np.vstack([np.eye(3), -np.eye(3), [[0.6, 0.8, 0.0], [-0.48, 0.6, 0.64]]]).tolist()
 )
 def test_the_opposite_of_an_axis_is_half_a_turn_about_something_across(axis):
     poses = np.tile(np.eye(4), (1, 1, 1))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from inverse_arms import arm
@@ -35,6 +37,8 @@ def test_a_branch_is_within_limits_where_it_is_valid_and_no_joint_is_outside_on_
 def test_the_shortfall_is_that_of_the_branch_with_the_least_sum_and_none_where_one_is_valid():
     closure = [[0.3, 0.0], [0.1, 0.1], [0.05, 0.4]]  # the second is neither the nearest nor the straightest
     assert made(np.zeros((3, 2)), False, closure).shortfall.tolist() == [0.1, 0.1]
+    turned = [[0.15, 0.0], [0.1, 0.1], [1.0, 0.0]]
+    assert made(np.zeros((3, 2)), False, turned).shortfall.tolist() == [0.15, 0.0]
     # outside the limits it is reached nevertheless
     assert made(np.full((3, 2), 9.0), [False, False, True], closure).shortfall.tolist() == [0.0, 0.0]
     lost = [[np.nan, 0.0], [0.7, 0.2], [np.inf, 0.0]]
@@ -107,11 +111,19 @@ def test_of_a_batch_the_first_target_that_has_no_answer_is_told():
     ):
         check_reachable(ARM, made([fine, lost, lost]))
     missed = made(
-        [fine, fine, fine], [[True] * 3, [False] * 3, [True] * 3], np.full((3, 3, 2), [0.25, np.pi / 2])
+        [fine, fine, fine],
+        [[True] * 3, [False] * 3, [True] * 3],
+        np.full((3, 3, 2), [0.123456789, np.pi / 2]),
     )
-    with pytest.raises(PlanningError, match=r"number 1 of .* within 0\.25 m and 1\.5708 rad") as caught:
+    with pytest.raises(PlanningError, match=r"number 1 of .* within 0\.123457 m and 1\.5708 rad") as caught:
         check_reachable(ARM, missed)
     assert caught.value.problems[0].hint == "move the target, or leave coordinates of its orientation free"
     with pytest.raises(PlanningError) as caught:
         check_reachable(ARM, missed, turning_helps=False)
     assert caught.value.problems[0].hint == "move the target"
+    fixed = replace(missed, fixed_axis="x")
+    with pytest.raises(PlanningError) as caught:
+        check_reachable(ARM, fixed)
+    assert caught.value.problems[0].hint == (
+        "no joint turns the x axis of the tool: mean another one, with `tool_axis`"
+    )

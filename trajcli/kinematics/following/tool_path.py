@@ -150,8 +150,8 @@ class SpeedLimits:
         for k in range(int((last - first).max(initial=0))):
             interval = np.minimum(first + k + 1, last)
             speed, angular = (
-                np.maximum(most, each[interval])
-                for most, each in ((speed, self.speed), (angular, self.angular_speed))
+                np.maximum(larger, each[interval])
+                for larger, each in ((speed, self.speed), (angular, self.angular_speed))
             )
         return speed, angular
 

@@ -240,9 +240,9 @@ def _limited(bounds: Array, q: Array, null: Array, step: Array) -> Array:
     ends[:, 0], ends[:, 1] = -np.inf, np.inf
     moves = np.abs(null) > _AT_LIMIT
     np.divide(bounds - q[:, None], null[:, None], out=ends, where=moves[:, None])
-    least, most = ends.min(axis=1).max(axis=1), ends.max(axis=1).min(axis=1)
-    limited = _short(np.minimum(np.maximum(step, least), most))
-    return np.where(least <= most, limited, 0.0)
+    lower, upper = ends.min(axis=1).max(axis=1), ends.max(axis=1).min(axis=1)
+    limited = _short(np.minimum(np.maximum(step, lower), upper))
+    return np.where(lower <= upper, limited, 0.0)
 
 
 def _correction_and_null(errors: Array, slopes: Array) -> tuple[Array, Array]:

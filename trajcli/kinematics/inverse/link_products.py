@@ -81,25 +81,25 @@ def poses_and_jacobians(robot: Robot, q: Array) -> tuple[Array, Array]:
     Raises:
         InputError: When the robot has none.
     """
-    known, values = _constants(robot), q.T
-    angles = (known.angle + known.turning * values)[..., None, None]
-    local = np.cos(angles) * known.along
-    local += np.sin(angles) * known.across
-    local += known.fixed
-    if known.slides:
-        slides = np.where(known.sliding[:, None], values, 0.0)
-        local += slides[..., None, None] * known.slid
+    constants, values = _constants(robot), q.T
+    angles = (constants.angle + constants.turning * values)[..., None, None]
+    local = np.cos(angles) * constants.along
+    local += np.sin(angles) * constants.across
+    local += constants.fixed
+    if constants.slides:
+        slides = np.where(constants.sliding[:, None], values, 0.0)
+        local += slides[..., None, None] * constants.slid
     frames = np.empty((len(values) + 1, len(q), 4, 4))
-    frames[0] = known.first
+    frames[0] = constants.first
     for before, link, behind in zip(frames, local, frames[1:], strict=False):
         np.matmul(before, link, out=behind)
     up, origin = frames[..., :3, 2:].T  # each (3, K, n + 1)
     jacobians = np.empty((len(q), 6, len(values)))
     by_row = jacobians.swapaxes(0, 1)
-    (x, y, z), (a, b, c) = up[..., :-1] * known.sign, origin[..., -1:] - origin[..., :-1]
+    (x, y, z), (a, b, c) = up[..., :-1] * constants.sign, origin[..., -1:] - origin[..., :-1]
     for out, entry in zip(by_row, (y * c - z * b, z * a - x * c, x * b - y * a, x, y, z), strict=True):
         out[...] = entry
-    if known.slides:
-        jacobians[:, :3] = np.where(known.sliding, jacobians[:, 3:], jacobians[:, :3])
-        jacobians[:, 3:] = np.where(known.sliding, 0.0, jacobians[:, 3:])
+    if constants.slides:
+        jacobians[:, :3] = np.where(constants.sliding, jacobians[:, 3:], jacobians[:, :3])
+        jacobians[:, 3:] = np.where(constants.sliding, 0.0, jacobians[:, 3:])
     return frames[-1], jacobians

@@ -65,8 +65,8 @@ class Planar:
 
     def __call__(self, goal: Displacement, flags: DegeneracyFlags) -> Sequence[Value]:
         """Return the joints: choice elbow."""
-        one, two, *rest = self.plane
-        point = rest[0].point if rest else self.tip
+        one, two, *after = self.plane
+        point = after[0].point if after else self.tip
         aim = goal.point(point)
         first: Turn
         values: list[Value] = [0.0] * len(self.axes)
@@ -78,9 +78,9 @@ class Planar:
             total = added(first, second, same_direction(one, two))
             values[self.indices[1]] = second
         values[self.indices[0]] = first
-        if rest:
+        if after:
             lacking = added(_angle_of_tool(one, goal, flags), total, -1.0)
-            values[self.indices[2]] = lacking[0], product(same_direction(one, rest[0]), lacking[1])
+            values[self.indices[2]] = lacking[0], product(same_direction(one, after[0]), lacking[1])
         if self.rise is not None:
             slide_axis = self.axes[self.rise].direction
             values[self.rise] = dot(slide_axis, minus(aim, point))

@@ -131,8 +131,8 @@ def turn_and_slide(
         across(minus(aim, turn.point), turn.direction),
     )
     ahead = dot(arm, slide.direction)
-    rest = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
-    distance = difference(_lengths(rest, flags, slide.sign), ahead)
+    square = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
+    distance = difference(_lengths(square, flags, slide.sign), ahead)
     reached = advance(arm, distance, slide.direction)
     return unit(onto(turn.direction, reached, to_aim), flags, FREE * flags.length**2), np.asarray(distance)
 
@@ -162,8 +162,8 @@ def ball(
     if three.prismatic:
         arm = minus(point, center)
         ahead = dot(arm, three.direction)
-        rest = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
-        third = difference(_lengths(rest, flags, three.sign), ahead)
+        square = _plus_square(difference(dot(to_aim, to_aim), dot(arm, arm)), ahead)
+        third = difference(_lengths(square, flags, three.sign), ahead)
         arm = advance(arm, third, three.direction)
     else:
         link, arm = minus(three.point, center), minus(point, three.point)

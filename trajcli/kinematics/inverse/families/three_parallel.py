@@ -81,8 +81,8 @@ class ThreeParallel:
         aim = minus(before_turn(one, target, first), turned(minus(self.point, four.point), axis, total))
         up = across_floats(self.arm.upward, axis)
         second, third = parallel_pair(two, three, four.point, aim, flags, up)
-        rest = added(added(total, second, -1.0), third, -same_direction(two, three))
-        fourth = rest[0], product(same_direction(two, four), rest[1])
+        lacking = added(added(total, second, -1.0), third, -same_direction(two, three))
+        fourth = lacking[0], product(same_direction(two, four), lacking[1])
         return [first, second, third, fourth, *after]
 
     def _sum(self, goal: Displacement, first: Turn, flags: DegeneracyFlags) -> tuple[Turn, list[Value]]:
@@ -123,8 +123,6 @@ def match(arm: AxisGeometry) -> IkMethod | None:
         point = axes[4].point
         reason += " and axis 5 is not"
     if count == 6:
-        if parallel(axes[4], axes[5]):
-            return None
         point = meeting_point(axes[4], axes[5], arm.length)
         choices.insert(1, "wrist")
         reason += " and axes 5 and 6 meet"
