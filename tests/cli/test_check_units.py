@@ -152,3 +152,18 @@ def test_columns_of_the_tool_beside_joints_have_the_units_that_somebody_says(tmp
     said = call(capfd, "check", tmp_path / "rows.csv", "--job", tmp_path / "job.yaml", "--json", *options)
     (found,) = json.loads(said.out)["findings"]
     assert (found["kind"], found["row"], found["value"]) == ("tool", 20, pytest.approx(1e-3, rel=1e-6))
+
+
+@pytest.mark.parametrize("command", ["check", "plot"])
+def test_advice_about_degrees_helps_whoever_reads_the_file(command, tmp_path, capfd):
+    """`plot` has no --units, so the columns are named by their unit."""
+    stands = JOB.format(units="").replace("[0, 0]", "[0, 90 deg]")
+    (tmp_path / "job.yaml").write_text(stands.replace("planar2r", "{joints: [{}, {position: [-2, 2]}]}"))
+    job = ["--job", tmp_path / "job.yaml"] if command == "check" else [tmp_path / "job.yaml"]
+    out = [] if command == "check" else ["-o", tmp_path / "out.svg"]
+    for name, code in (("q", 1), ("q{}_deg", 0)):
+        names = [name.format(k) if "{" in name else f"{name}{k}" for k in (1, 2)]
+        (tmp_path / "in.csv").write_text(f"t,{','.join(names)}\n0.0,0,90\n1.0,0,90\n")
+        said = call(capfd, command, tmp_path / "in.csv", *job, *out)
+        assert said.code == code
+        assert ("say --units deg, or q1_deg in a CSV" in said.out + said.err) == bool(code)

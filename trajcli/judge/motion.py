@@ -416,6 +416,6 @@ def _with_unit_hint(findings: Sequence[Finding], axes: NamedJoints, farthest: fl
     if of_joints:
         at = min(of_joints, key=lambda k: found[k].kind != "position")
         if found[at].hint is None:
-            hint = f"values up to {farthest:.6g}: degrees? then say --units deg"
+            hint = f"values up to {farthest:.6g}: degrees? then say --units deg, or q1_deg in a CSV"
             found[at] = replace(found[at], hint=hint)
     return found
