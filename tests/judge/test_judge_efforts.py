@@ -211,7 +211,8 @@ def swing(
     states = [-np.sin(w * t) / w**2, -np.cos(w * t) / w, np.sin(w * t)]
     rows = np.column_stack([t, *(largest * values for values in states)])[:, : columns + 1]
     names = ["t", "q1", "qd1", "qdd1"][: columns + 1]
-    np.savetxt(folder / "rows.csv", rows, f"%.{decimals}f", ",", header=",".join(names), comments="")
+    numbers = ["%.6f", *[f"%.{decimals}f"] * columns]
+    np.savetxt(folder / "rows.csv", rows, numbers, ",", header=",".join(names), comments="")
     options = CheckOptions(robot=str(folder / "arm.yaml"))
     judged = check_file(str(folder / "rows.csv"), options).judgement
     return judged.verdict, [each for each in judged.findings if each.kind == "effort"]
@@ -247,12 +248,55 @@ def test_what_dense_rows_state_is_over_a_limit_whatever_their_decimals_make_of_t
     assert verdict == ("exceeded" if over else "satisfied")
     certain = [each for each in found if (each.certainty, each.severity) == ("exceeded", "error")]
     assert len(certain) == over
+    assert all((each.certainty == "exceeded") == (abs(each.value) - 2.5 > each.rounding) for each in found)
     for each in certain:
         assert each.value == pytest.approx(side * 0.33 * largest, rel=0.02 if decimals == 4 else 0.05)
         assert each.factor == pytest.approx((abs(each.value) / 2.5) ** 0.5, rel=1e-5)
         assert each.row == round(each.time / 4e-3 - 0.01) + 1
         assert each.time == pytest.approx(0.5 - 0.25 * side, abs=0.03)
         assert each.method == ("sampled" if decimals == 4 else each.method)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("largest", "over"), [(7.8, True), (7.4, False)])
+@pytest.mark.parametrize("decimals", [3, 6])
+def test_a_torque_between_sparse_rows_is_hidden_by_no_short_interval(
+    decimals: int, largest: float, side: int, tmp_path: Path, *, over: bool
+) -> None:
+    """At the rows beside 0.25 and 0.75 s there is a twentieth less than between them; 7.6 rad/s^2 are allowed.
+
+    Three decimals make a quarter of a newton metre of the curve, so that nothing is certain.
+    """
+    t = np.sort(np.append(np.arange(11) * 0.1, 0.5001))
+    verdict, found = swing(tmp_path, t, largest, 3, decimals, side)
+    assert (verdict == "exceeded") == (over and decimals == 6)
+    for each in found if verdict == "exceeded" else ():
+        assert (each.severity, each.certainty, each.method) == ("error", "exceeded", "bounded")
+        assert each.value == pytest.approx(side * 0.33 * largest, rel=1e-3)
+        assert each.time == pytest.approx(0.5 - 0.25 * side, abs=1e-3)
+
+
+@pytest.mark.parametrize("asked", [True, False])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_torque_of_the_curve_through_dense_rows_is_an_error_where_somebody_asked_for_it(
+    side: int, tmp_path: Path, *, asked: bool
+) -> None:
+    """A step of acceleration between two rows, of which the quintic makes 1.12 times as much; beside a short interval."""
+    t = np.sort(np.append(np.arange(51) * 4e-3, 0.0401))
+    since = np.maximum(t - 0.1212, 0.0)
+    rows = np.column_stack([t, 0.5 * since**2, since, since > 0])
+    rows[:, 1:] *= side
+    (tmp_path / "arm.yaml").write_text(
+        "name: arm\nconvention: standard\njoints:\n  - {a: 1, effort: 0.3465, "
+        "link: {mass: 1, com: [-0.5, 0, 0], inertia: [0.08, 0.08, 0.08, 0, 0, 0]}}\n"
+    )
+    np.savetxt(tmp_path / "rows.csv", rows, "%.8f", ",", header="t,q1,qd1,qdd1", comments="")
+    options = CheckOptions(robot=str(tmp_path / "arm.yaml"), interpolate="quintic" if asked else None)
+    judged = check_file(str(tmp_path / "rows.csv"), options).judgement
+    assert judged.verdict == ("exceeded" if asked else "satisfied")
+    (told,) = (each for each in judged.findings if each.kind == "effort")
+    assert (told.severity == "error") == asked
+    assert not asked or told.value == pytest.approx(side * 0.33 * 1.12, rel=5e-3)
 
 
 @pytest.mark.parametrize("side", [1, -1])
