@@ -282,7 +282,7 @@ def test_a_torque_of_the_curve_through_dense_rows_is_an_error_where_somebody_ask
     side: int, tmp_path: Path, *, asked: bool
 ) -> None:
     """A step of acceleration between two rows, of which the quintic makes 1.12 times as much; beside a short interval."""
-    t = np.sort(np.append(np.arange(51) * 4e-3, 0.0401))
+    t = np.sort(np.append(np.arange(51) * 4e-3, 0.1601))
     since = np.maximum(t - 0.1212, 0.0)
     rows = np.column_stack([t, 0.5 * since**2, since, since > 0])
     rows[:, 1:] *= side

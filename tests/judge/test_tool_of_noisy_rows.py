@@ -22,9 +22,17 @@ OF_ARMS = [("revolute", name) for name in (*SIZES, *(f"angular_{name}" for name 
 
 
 def swing(
-    joint: str, limit: str, share: float, t: np.ndarray, columns: int, decimals: int, *, asked: bool = False
+    joint: str,
+    limit: str,
+    share: float,
+    t: np.ndarray,
+    columns: int,
+    decimals: int,
+    *,
+    asked: bool = False,
+    arm: float = 1.0,
 ) -> tuple[str, list[Finding]]:
-    """Return the verdict and what is found of a tool that swings at 1 Hz by one joint, 1 m beside it where that turns.
+    """Return the verdict and what is found of a tool that swings at 1 Hz by one joint, beside it where that turns.
 
     Its limit is a share of the largest derivative of the joint; of a point that turns the square of the speed adds 2 %.
     """
@@ -34,7 +42,7 @@ def swing(
     name = limit.removeprefix("angular_")
     bounds = replace(unlimited(1), tcp=ToolLimits(**{limit: share * SIZES[name]}))
     tool = np.eye(4)
-    tool[0, 3] = 1.0
+    tool[0, 3] = arm
     robot = Robot("arm", (Joint("a", type=joint),), bounds, "standard", np.eye(4), tool)
     rows = RecordedMotion(t, *states, None, None, None, None, Resolution(0.0, half, half, half), "rows")
     joined = ("linear", "cubic", "quintic")[columns - 1] if asked else None
@@ -59,7 +67,10 @@ def test_dense_rows_that_state_too_much_are_over_the_limit(
     for each in found if over else ():
         assert (each.severity, each.certainty) == ("error", "exceeded")
         assert abs(each.value - SIZES[name]) <= 0.03 * SIZES[name] + each.rounding
-        assert each.rounding < 0.2 * SIZES[name]
+        assert 0.0 < each.rounding < 0.2 * SIZES[name]
+        if name != "speed":
+            assert each.method == "sampled"
+            assert each.time / 4e-3 % 1.0 == pytest.approx(0.5, abs=0.01)
         assert each.row == round(each.time / 4e-3 - 0.25) + 1
 
 
@@ -84,7 +95,7 @@ def test_dense_rows_whose_curve_alone_is_over_a_limit_are_over_it_where_somebody
     *, asked: bool
 ) -> None:
     """Beside a short interval that rounding explains: a step of acceleration between two rows, of which the quintic makes 1.12 m/s^2."""
-    t = np.sort(np.append(np.arange(51) * 4e-3, 0.0401))
+    t = np.sort(np.append(np.arange(51) * 4e-3, 0.1601))
     since = np.maximum(t - 0.1212, 0.0)
     states = [0.5 * since**2, since, (since > 0).astype(float)]
     half = np.full(1, 0.5e-8)
@@ -106,3 +117,46 @@ def test_dense_rows_whose_curve_alone_is_over_a_limit_are_over_it_where_somebody
     )
     found = [each for each in judgement.findings if each.kind == "tool_acceleration"]
     assert [each.certainty == "exceeded" and each.severity == "error" for each in found] == [asked]
+
+
+@pytest.mark.parametrize(("joint", "limit"), OF_ARMS)
+@pytest.mark.parametrize("period", [4e-3, 2e-2])
+@pytest.mark.parametrize("asked", [False, True])
+def test_what_rounding_makes_of_rows_is_never_certain(
+    period: float, limit: str, joint: str, *, asked: bool
+) -> None:
+    """Three decimals, of which differences and curves make more than is allowed."""
+    t = np.arange(round(1 / period) + 1) * period
+    for columns in range(NEEDED[limit.removeprefix("angular_")], 4):
+        verdict, _ = swing(joint, limit, 1.03, t, columns, 3, asked=asked)
+        assert verdict != "exceeded"
+
+
+@pytest.mark.parametrize(
+    ("joint", "limit"), [("prismatic", "acceleration"), ("revolute", "angular_acceleration")]
+)
+@pytest.mark.parametrize(("share", "over"), [(0.99, True), (1.01, False)])
+def test_what_is_largest_between_sparse_rows_is_hidden_by_no_short_interval(
+    share: float, limit: str, joint: str, *, over: bool
+) -> None:
+    """The mean of 0.1 s around the peak is a sixtieth less than this; a point half a metre away has half of it."""
+    t = np.sort(np.append(np.arange(11) * 0.1, 0.5001))
+    verdict, found = swing(joint, limit, share, t, 3, 6, arm=0.5)
+    assert (verdict == "exceeded") == over
+    for each in found if over else ():
+        assert (each.method, each.value) == ("bounded", pytest.approx(LARGEST, rel=1e-3))
+        assert min(abs(each.time - 0.25), abs(each.time - 0.75)) < 1e-3
+
+
+def test_a_turn_is_told_from_what_a_point_beside_it_does() -> None:
+    """By dense rows: half a metre away from the axis the acceleration is half of the angular one."""
+    t = np.arange(251) * 4e-3
+    for limit, share, over in (
+        ("angular_acceleration", 0.9, True),
+        ("acceleration", 0.45, True),
+        ("acceleration", 0.56, False),
+        ("angular_speed", 0.9, True),
+        ("speed", 0.56, False),
+    ):
+        verdict, _ = swing("revolute", limit, share, t, NEEDED[limit.removeprefix("angular_")], 4, arm=0.5)
+        assert (verdict == "exceeded") == over, limit
