@@ -58,7 +58,7 @@ def parse_units(units: str | Units | None) -> SaidUnits:
     if not isinstance(units, str):
         return SaidUnits() if units is None else SaidUnits(units.angle, units.length)
     said: dict[str, str] = {}
-    known = {
+    measured = {
         "rad": "angle",
         "deg": "angle",
         "m": "length",
@@ -67,12 +67,12 @@ def parse_units(units: str | Units | None) -> SaidUnits:
     }
     for part in units.split(","):
         unit = part.strip()
-        if unit not in known:
-            hint = did_you_mean(unit, known) or f"units are {', '.join(known)}"
+        if unit not in measured:
+            hint = did_you_mean(unit, measured) or f"units are {', '.join(measured)}"
             raise InputError(f"--units: unknown unit '{unit}'", hint=hint)
-        if known[unit] in said:
-            raise InputError(f"--units: {said[known[unit]]} and {unit} are both units of {known[unit]}")
-        said[known[unit]] = unit
+        if measured[unit] in said:
+            raise InputError(f"--units: {said[measured[unit]]} and {unit} are both units of {measured[unit]}")
+        said[measured[unit]] = unit
     return SaidUnits(
         cast("AngleUnit | None", said.get("angle")),
         cast("LengthUnit | None", said.get("length")),
@@ -250,17 +250,17 @@ def _per_second(file: NamedFile, roles: ColumnRoles, said: SaidUnits) -> float:
     return _PER_SECOND[said.time or ("ns" if roles.nanoseconds else "s")]
 
 
-def no_unit(file: NamedFile, names: Sequence[str], most: float) -> InputError:
+def no_unit(file: NamedFile, names: Sequence[str], largest: float) -> InputError:
     """Return the error about columns whose unit nothing says.
 
     Args:
         file: Names and places.
         names: Of the columns.
-        most: The largest magnitude in them.
+        largest: The largest magnitude in them.
     """
     listed = ", ".join(names) if len(names) <= 3 else f"{names[0]} .. {names[-1]}"
-    guess = "degrees?" if most > 4 * np.pi else "radians?"
-    hint = f"values up to {most:.3g}: {guess} say it with --units rad or --units deg"
+    guess = "degrees?" if largest > 4 * np.pi else "radians?"
+    hint = f"values up to {largest:.3g}: {guess} say it with --units rad or --units deg"
     if file.place(names[0]) is not None:
         suffixed = re.sub(r"\W+", "_", names[0]).strip("_")
         hint += f", or call it {suffixed}_deg"

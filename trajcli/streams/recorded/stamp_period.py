@@ -22,7 +22,7 @@ _LEAST_RATIO = 10.0  # units of the last decimal in a period: below, rounded sta
 _FEWEST = 3
 _STEPS = 200  # halvings of an interval of periods: more than a float64 has bits
 _ULPS = 8.0  # of the largest stamp: what sums and products of floats leave
-_MANY = 4096  # corners, above which the hull of those is taken
+_MANY = 4096  # corners, above which the hull of those is taken; then, where they are twice as many as it left
 
 
 @comparable
@@ -52,6 +52,7 @@ class PeriodFit:
     def __init__(self) -> None:
         self._count, self._first, self._last, self._rising = 0, 0.0, -np.inf, True
         self._upper, self._lower = np.empty((0, 2)), np.empty((0, 2))
+        self._many = _MANY
 
     def add(self, times: Array) -> None:
         """Take the next stamps, s, shape (N,)."""
@@ -64,9 +65,10 @@ class PeriodFit:
         self._count += times.size
         self._upper = np.concatenate([self._upper, points[_corners(points, 1.0)]])
         self._lower = np.concatenate([self._lower, points[_corners(points, -1.0)]])
-        if max(len(self._upper), len(self._lower)) > _MANY:
+        if max(len(self._upper), len(self._lower)) > self._many:
             self._upper = self._upper[_corners(self._upper, 1.0)]
             self._lower = self._lower[_corners(self._lower, -1.0)]
+            self._many = max(_MANY, 2 * len(self._upper), 2 * len(self._lower))
 
     def result(self, rounding: float, relative: float = 0.0) -> StampGrid | None:
         """Return the grid of all stamps so far; None where there is none."""
@@ -82,20 +84,20 @@ class PeriodFit:
         if self._spread(best) <= 2 * noise:  # on a grid as they are written: no other one is meant
             allowed = noise
         period = self._simplest(best, allowed)
-        low, high = self._rest(period)
+        low, high = self._ends(period)
         start = _start(low, high, self._first, allowed)
         deviation = max(high - start, start - low)
         if deviation > noise and period < 2 * _LEAST_RATIO * (allowed - noise):
             return None
         return StampGrid(start, period, deviation > noise, deviation)
 
-    def _rest(self, period: float) -> tuple[float, float]:
+    def _ends(self, period: float) -> tuple[float, float]:
         """Return the least and the largest t - k h."""
         lower, upper = (points[:, 1] - points[:, 0] * period for points in (self._lower, self._upper))
         return float(lower.min()), float(upper.max())
 
     def _spread(self, period: float) -> float:
-        low, high = self._rest(period)
+        low, high = self._ends(period)
         return high - low
 
     def _slope(self, period: float) -> float:
