@@ -14,7 +14,7 @@ from trajcli.columns import columns_of
 from trajcli.errors import InputError, TrajcliError
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
-from trajcli.streams.arrays import verify_npy, verify_npz, write_npy_blocks, write_npz_blocks
+from trajcli.streams.arrays import _header, verify_npy, verify_npz, write_npy_blocks, write_npz_blocks
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.formats import write_verified
 from trajcli.streams.recorded_motion import open_motion
@@ -174,3 +174,15 @@ def test_a_damaged_array_is_one_error(ending: str, shape: str, tmp_path: Path) -
             archive.writestr("a.npy", member_of(shape))
     with pytest.raises(InputError, match=r"no archive of numpy|no array of numpy|is cut|no table"):
         open_motion(file, units="rad")
+
+
+@pytest.mark.parametrize("columns", [1, 3, 4, 7, 12, 40])
+def test_numbers_begin_at_a_multiple_of_64_bytes_as_the_format_asks(columns: int) -> None:
+    """Header and length together, whose last byte is a line feed; numpy reads no more of it than its length says."""
+    header = _header(np.dtype([(f"column_{k}", "<f8") for k in range(columns)]), 12)
+    length = int.from_bytes(header[8:10], "little")
+    assert len(header) == 10 + length
+    assert len(header) % 64 == 0
+    assert header.endswith(b" \n")
+    shape, fortran, dtype = np.lib.format.read_array_header_1_0(io.BytesIO(header[8:]))
+    assert (shape, fortran, len(dtype.names or ())) == ((12,), False, columns)
