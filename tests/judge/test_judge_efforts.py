@@ -320,3 +320,19 @@ def test_torques_of_controllers_that_join_rows_in_their_own_ways(
     assert judged.verdict == ("exceeded" if over else "satisfied")
     for each in judged.findings:
         assert (each.kind, abs(each.value)) == ("effort", pytest.approx(0.33 * 9.0, rel=0.02))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_joint_that_rounding_alone_turns_at_rest_has_not_gone_back(side: int, tmp_path: Path) -> None:
+    """It brakes with 10 rad/s^2 and 1 N m of friction: 2.3 of 2.5 N m; a last velocity of a unit is none."""
+    (tmp_path / "arm.yaml").write_text(
+        "name: arm\nconvention: standard\njoints:\n  - {a: 1, effort: 2.5, friction: {coulomb: 1}, "
+        "link: {mass: 1, com: [-0.5, 0, 0], inertia: [0.08, 0.08, 0.08, 0, 0, 0]}}\n"
+    )
+    t = np.arange(26) * 0.004
+    rows = np.column_stack([t, t - 5 * t**2, 1 - 10 * t, np.full(26, -10.0)])
+    rows[-1, 2] = -1e-4
+    rows[:, 1:] *= side
+    np.savetxt(tmp_path / "rows.csv", rows, "%.4f", ",", header="t,q1,qd1,qdd1", comments="")
+    found = check_file(str(tmp_path / "rows.csv"), CheckOptions(robot=str(tmp_path / "arm.yaml"))).judgement
+    assert not [each for each in found.errors if each.kind == "effort"]
