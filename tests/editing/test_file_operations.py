@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -308,3 +309,69 @@ def test_a_motion_as_written_is_what_is_read(source: Path, tmp_path: Path) -> No
         np.testing.assert_allclose(getattr(expected, name), getattr(found, name), rtol=0, atol=1e-14)
     np.testing.assert_allclose(expected.resolution.q, found.resolution.q)
     assert not np.signbit(expected.q[expected.q == 0]).any()
+
+
+def rows_file(path: Path, text: str) -> EditedMotion:
+    path.write_text(text)
+    return read(path)
+
+
+LATE = "t,q1,qd1,qdd1\n5,1,0,0\n5.5,1.25,1,0\n6.5,2,0.5,0\n"
+
+
+def test_a_motion_that_begins_late_is_reversed_in_its_own_time(tmp_path: Path) -> None:
+    motion = rows_file(tmp_path / "late.csv", LATE)
+    _, rows = table(written(reverse(motion), tmp_path / "back.csv"))
+    np.testing.assert_array_equal(rows[:, 0], [5, 6, 6.5])
+    np.testing.assert_array_equal(rows[:, 1:3], [[2, -0.5], [1.25, -1], [1, 0]])
+
+
+def test_a_motion_that_begins_late_has_its_new_rows_from_its_start_to_its_end(tmp_path: Path) -> None:
+    motion = rows_file(tmp_path / "late.csv", LATE)
+    assert resample(motion, 2.0).rows.t.tolist() == [5, 5.5, 6, 6.5]
+    assert resample(motion, 1.0).rows.t.tolist() == [5, 6, 6.5]
+    assert resample(motion, 0.25).rows.t.tolist() == [5, 6.5]
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "joins"),
+    [("2.001", "0.501", True), ("1.999", "0.499", True), ("2.003", "0.5", False), ("2", "0.497", False)],
+)
+def test_states_agree_within_the_decimals_of_both_files(
+    position: str, velocity: str, joins: bool, tmp_path: Path
+) -> None:
+    """Each number of three decimals is off by half a thousandth at most."""
+    first = rows_file(tmp_path / "first.csv", "t,q1,qd1\n0.000,1.000,0.000\n1.000,2.000,0.500\n")
+    text = f"t,q1,qd1\n0.000,{position},{velocity}\n1.000,3.000,0.000\n"
+    other = rows_file(tmp_path / "second.csv", text.replace("2,0.497", "2.000,0.497"))
+    if joins:
+        assert join(first, other).rows.q[1, 0] == float(position)
+        return
+    with pytest.raises(VerificationError, match="jumps by"):
+        join(first, other)
+
+
+def test_joints_of_other_names_are_not_joined(tmp_path: Path) -> None:
+    first, other = (
+        replace(motion, rows=replace(motion.rows, joints=(name,)))
+        for name in ("elbow", "wrist")
+        for motion in [rows_file(tmp_path / f"{name}.csv", "t,q1\n0,1\n1,1\n")]
+    )
+    with pytest.raises(InputError, match=r"elbow.csv has the joints elbow; .*wrist.csv has wrist"):
+        join(first, other)
+
+
+@pytest.mark.parametrize(("later", "steps"), [("1", False), ("1.5", True), ("0.5", True)])
+def test_an_acceleration_that_steps_where_motions_meet_is_said(
+    later: str, steps: bool, tmp_path: Path
+) -> None:
+    first = rows_file(tmp_path / "first.csv", "t,q1,qd1,qdd1\n0,1,0,0\n1,2,0.5,1\n")
+    other = rows_file(tmp_path / "second.csv", f"t,q1,qd1,qdd1\n0,2,0.5,{later}\n1,3,0,0\n")
+    joined = join(first, other)
+    assert joined.quantities["qdd"][1, 0] == float(later)
+    said = [note for note in joined.notes if "steps at 1 s" in note]
+    assert (
+        said
+        == [f"the acceleration of j1 steps at 1 s from 1 to {later} (SI); the row there has the later one"]
+        * steps
+    )

@@ -309,10 +309,10 @@ def _motion_parts(
     if overshoot and initial * final < 0:  # one turn, where the brake ends or where the run-up begins
         first = (brake.distance > distance - run_up.distance) == (initial > 0)
     if first:
-        rest = _motion_parts(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
-        return replace(rest, before=brake.then(rest.before))
-    rest = _motion_parts(distance - run_up.distance, initial, 0.0, forward, backward, overshoot=overshoot)
-    return replace(rest, after=rest.after.then(run_up))
+        other = _motion_parts(distance - brake.distance, 0.0, final, forward, backward, overshoot=overshoot)
+        return replace(other, before=brake.then(other.before))
+    other = _motion_parts(distance - run_up.distance, initial, 0.0, forward, backward, overshoot=overshoot)
+    return replace(other, after=other.after.then(run_up))
 
 
 def _ramp(initial: float, final: float, rates: MotionBounds) -> VelocityProfile:
@@ -351,11 +351,11 @@ def _middle_of_duration(motion: _ThreePartMotion, duration: float) -> VelocityPr
         up, down = (a if first > 0 else d), (d if second > 0 else a)
         square = first / (2 * up) + second / (2 * down)
         linear = duration + first * initial / up + second * final / down
-        rest = motion.distance + first * initial**2 / (2 * up) + second * final**2 / (2 * down)
-        for cruise in _roots(square, -linear, rest):
-            room = _ROUNDING * cruise
+        constant = motion.distance + first * initial**2 / (2 * up) + second * final**2 / (2 * down)
+        for cruise in _roots(square, -linear, constant):
+            slack = _ROUNDING * cruise
             rise, fall = abs(cruise - initial) / up, abs(cruise - final) / down
-            fits = first * (cruise - initial) >= -room and second * (cruise - final) >= -room
+            fits = first * (cruise - initial) >= -slack and second * (cruise - final) >= -slack
             if cruise > 0 and fits and rise + fall <= duration * (1 + _ROUNDING):
                 return _three(initial, cruise, final, rise, fall, duration)
     return None

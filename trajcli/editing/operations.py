@@ -48,12 +48,12 @@ def cut(motion: EditedMotion, first: float, last: float) -> EditedMotion:
         InputError: When the motion is not there at these times, or they are not in order.
     """
     t = motion.rows.t
-    room = _room(motion, float(np.diff(t).min()) / 4)
+    slack = _slack_of(motion, float(np.diff(t).min()) / 4)
     for name, time in (("--from", first), ("--to", last)):
-        if not t[0] - room <= time <= t[-1] + room:
+        if not t[0] - slack <= time <= t[-1] + slack:
             extent = f"{motion.rows.source} goes from {t[0]:.15g} s to {t[-1]:.15g} s"
             raise InputError(f"{name} {time:.9g}: {extent}", hint="give times of the file, s")
-    begin, end = _snapped(motion, np.array([first, last]), room)
+    begin, end = _snapped(motion, np.array([first, last]), slack)
     if not begin < end:
         raise InputError(f"--from {first:.9g} is not before --to {last:.9g}")
     return _at(motion, np.concatenate([[begin], t[(t > begin) & (t < end)], [end]]))
@@ -71,14 +71,14 @@ def resample(motion: EditedMotion, rate: float) -> EditedMotion:
     times = np.concatenate([t[:1], *(stamps for stamps, _ in grid.blocks())])
     times[-1] = t[-1]
     # no two of the times come to one row, but the first two and the last two
-    return _at(motion, np.unique(_snapped(motion, times, _room(motion, (0.5 - _NEAR) / rate))))
+    return _at(motion, np.unique(_snapped(motion, times, _slack_of(motion, (0.5 - _NEAR) / rate))))
 
 
-def _room(motion: EditedMotion, most: float) -> float:
-    """Return how far a stamp may be off, by its rounding and at most by `most`, s."""
+def _slack_of(motion: EditedMotion, largest: float) -> float:
+    """Return how far a stamp may be off, by its rounding and at most by `largest`, s."""
     t, resolution = motion.rows.t, motion.rows.resolution
     relative = resolution.relative_time * float(np.abs(t).max())
-    return min(2 * max(resolution.time, relative) + _NEAR * float(np.diff(t).min()), most)
+    return min(2 * max(resolution.time, relative) + _NEAR * float(np.diff(t).min()), largest)
 
 
 def _nearest(motion: EditedMotion, times: Array) -> np.ndarray:
@@ -88,10 +88,10 @@ def _nearest(motion: EditedMotion, times: Array) -> np.ndarray:
     return np.where(times - t[after - 1] <= t[after] - times, after - 1, after)
 
 
-def _snapped(motion: EditedMotion, times: Array, room: float) -> Array:
-    """Return times, those within `room` of a row as the stamp of that row."""
+def _snapped(motion: EditedMotion, times: Array, slack: float) -> Array:
+    """Return times, those within `slack` of a row as the stamp of that row."""
     stamps = motion.rows.t[_nearest(motion, times)]
-    return np.where(np.abs(stamps - times) <= room, stamps, times)
+    return np.where(np.abs(stamps - times) <= slack, stamps, times)
 
 
 def _at(motion: EditedMotion, times: Array) -> EditedMotion:
@@ -171,10 +171,10 @@ def _check_states_agree(first: EditedMotion, second: EditedMotion) -> None:
         halves, shares = zip(
             *(each.rows.resolution.roundings[order] for each in (first, second)), strict=True
         )
-        room = 2 * sum(halves) + sum(shares) * np.abs(after) + _SAME * (1 + np.abs(after))
+        slack = 2 * sum(halves) + sum(shares) * np.abs(after) + _SAME * (1 + np.abs(after))
         problems += [
             _jump(first, second, joint, what, (float(before[joint]), float(after[joint])))
-            for joint in np.flatnonzero(np.abs(after - before) > room).tolist()
+            for joint in np.flatnonzero(np.abs(after - before) > slack).tolist()
         ]
     if problems:
         raise VerificationError(*problems)

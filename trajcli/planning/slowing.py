@@ -48,10 +48,10 @@ def _no_room(move: PlannedMove, state: State, verb: str) -> Problem | None:
     positions, accelerations = move.robot.limits.of_order(0), move.robot.limits.of_order(2)
     forward = state.velocity > 0
     ahead = forward if verb == "starts" else ~forward
-    room = np.where(ahead, positions[:, 1] - state.position, state.position - positions[:, 0])
+    left = np.where(ahead, positions[:, 1] - state.position, state.position - positions[:, 0])
     rate = np.where(ahead, -accelerations[:, 0], accelerations[:, 1])
     needed = state.velocity**2 / (2 * rate)
-    short = np.flatnonzero((state.velocity != 0) & exceeds(needed, room))
+    short = np.flatnonzero((state.velocity != 0) & exceeds(needed, left))
     if not short.size:
         return None
     joint = int(short[0])
@@ -60,7 +60,7 @@ def _no_room(move: PlannedMove, state: State, verb: str) -> Problem | None:
     amounts: Amounts = {
         "joint": move.robot.joint_names[joint],
         "velocity": Amount(float(state.velocity[joint]), 1, joint),
-        "room": Amount(float(room[joint]), 0, joint),
+        "room": Amount(float(left[joint]), 0, joint),
         "needed": Amount(float(needed[joint]), 0, joint, rounded="up"),
     }
     return Problem(message, amounts=amounts)

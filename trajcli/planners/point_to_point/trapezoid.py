@@ -33,6 +33,7 @@ _SAME_TIME = 1e-12  # relative: joints that arrive this close to each other arri
 _STILL = 1e-15  # per s: a thousandth of what counts as a jump
 _HINTS = {
     "speed": "choose a velocity inside the interval, or change the duration",
+    "no_speed": "change the duration, or the deceleration that is given",
     "acceleration": "raise the acceleration, or the duration",
     "duration": "choose a duration inside the interval",
     "too_fast": "say `overshoot: true`, raise the deceleration, or start slower",
@@ -262,6 +263,7 @@ def _infeasible(
     """Return the error in terms of one joint."""
     name = robot.joint_names[joint]
     amounts: dict[str, Amount | str] = {"joint": name}
+    reason = "no_speed" if error.reason == "speed" and not error.low < error.high else error.reason
     if error.reason in ("speed", "acceleration"):
         order = 1 if error.reason == "speed" else 2
         given = (move.velocity or (0.0,) * 12)[joint] if order == 1 else _acceleration(move, robot, joint)
@@ -275,14 +277,15 @@ def _infeasible(
         amounts |= {"low": Amount(error.low, rounded="up"), "high": Amount(error.high, rounded="down")}
     elif error.reason in ("too_fast", "too_slow"):
         amounts["needed"] = Amount(error.low * size, 0, joint, rounded="up")
-    return PlanningError(Problem(_message(error), _HINTS[error.reason], joint=name, amounts=amounts))
+    return PlanningError(Problem(_message(error, reason), _HINTS[reason], joint=name, amounts=amounts))
 
 
-def _message(error: InfeasibleProfileError) -> str:
+def _message(error: InfeasibleProfileError, reason: str) -> str:
     unbounded = error.high == float("inf")
     return {
         "speed": "no trapezoid of {duration}: the velocity of {joint} must be above {low} "
         "and at most {high}, got {given}",
+        "no_speed": "no trapezoid of {duration}: at no velocity does {joint} cover its distance, got {given}",
         "acceleration": "no trapezoid of {duration}: the acceleration of {joint} must be at least {low}, "
         "got {given}",
         "duration": "no trapezoid for {joint}: its duration must be at least {low}"
@@ -290,7 +293,7 @@ def _message(error: InfeasibleProfileError) -> str:
         "too_fast": "{joint} is too fast to end in the target: it needs {needed} to slow down",
         "too_slow": "{joint} cannot reach its end velocity in time: it needs {needed} to speed up",
         "turns": "{joint} would have to turn round to start and end with the given velocities",
-    }[error.reason]
+    }[reason]
 
 
 def _acceleration(move: Trapezoid, robot: Robot, joint: int) -> float:
