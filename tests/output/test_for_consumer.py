@@ -25,7 +25,7 @@ from trajcli.job.read import job_from_text, load_job
 from trajcli.output.consumer import job_for
 from trajcli.output.delivery.for_consumer import ForConsumer, Writing, plan_for
 from trajcli.output.delivery.joined_rows import JoinedRows
-from trajcli.output.delivery.stretched_moves import StretchedMoves
+from trajcli.output.delivery.slower_motion import StretchedMoves
 from trajcli.output.write import grid_of
 from trajcli.planners.planner import PlannedMove
 from trajcli.planners.point_to_point.whole_periods import PhasesInPeriods, profile_in_periods

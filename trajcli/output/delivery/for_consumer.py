@@ -178,7 +178,7 @@ def plan_for(
     first = search.first()
     if first.keeps or not first.plan.verdict.passed:
         return replace(first, said=said)
-    from trajcli.output.delivery.tightening import may_be_cured
+    from trajcli.output.delivery.slower_motion import may_be_cured
 
     if not all(map(may_be_cured, first.over)):
         return replace(first, said=said)
@@ -357,7 +357,7 @@ class _Search:
         """Return the motion stretched as a whole by the fewest periods that do, where that beats the best."""
         if not isinstance(first.grid, UniformGrid) or self._writing.form.content == "knots":
             return None
-        from trajcli.output.delivery.stretched_moves import StretchedMoves
+        from trajcli.output.delivery.slower_motion import StretchedMoves
 
         duration, rate = first.plan.trajectory.duration, first.grid.rate
         by_move = StretchedMoves(first.rows, rate, self._begun.fastest)
@@ -387,7 +387,7 @@ class _Search:
         self, loaded: LoadedJob, adapted: Adaptation, longest: float, *, stretched: bool = False
     ) -> ForConsumer | None:
         """Return a motion whose rows keep all, within tighter limits where that is needed."""
-        from trajcli.output.delivery.tightening import tightened
+        from trajcli.output.delivery.slower_motion import tightened
 
         for count in range(_ROUNDS):
             report_progress(f"planning for {self._profile.name}, round {count + 1}")
