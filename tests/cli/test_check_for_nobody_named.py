@@ -125,7 +125,7 @@ def test_rows_with_other_ends_are_planned_for_nobody(
     slower = file.read_text().splitlines()
     planned(capfd, "sync.yaml", file)
     own = _off(file.read_text().splitlines(), 4, 1, 1e-5)  # lasts as long as the job alone
-    monkeypatch.setattr(check, "_delivered", lambda *_: pytest.fail("it is planned for a consumer"))
+    monkeypatch.setattr(check, "delivered_as", lambda *_: pytest.fail("it is planned for a consumer"))
     for lines in (slower[:-1], own):
         file.write_text("\n".join(lines) + "\n")
         assert checked(capfd, "sync.yaml", file)[1]["planned_rows"] is False
