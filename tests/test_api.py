@@ -375,6 +375,9 @@ def test_files_are_judged_in_pages_and_pictures_as_the_commands_do(tmp_path: Pat
         page = (tmp_path / "page.html").read_text()
         assert "not judged" not in page
         assert '"state":"violated"' in page
+    trajcli.view(trajcli.plan(job), tmp_path / "of_plan.html", beside=rows)
+    trajcli.view(job, tmp_path / "of_job.html", beside=rows)
+    assert (tmp_path / "of_plan.html").read_bytes() == (tmp_path / "of_job.html").read_bytes()
     trajcli.plot(job, tmp_path / "marked.svg", over=rows)
     run("plot", str(job), str(rows), "-o", str(tmp_path / "by_command.svg"))
     assert (tmp_path / "marked.svg").read_bytes() == (tmp_path / "by_command.svg").read_bytes()

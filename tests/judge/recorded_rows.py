@@ -43,6 +43,13 @@ def rows_of(
     return RecordedMotion(stamps, *written, None, None, None, None, resolution, "rows")
 
 
+def rounded_rows(t: np.ndarray, states: list[np.ndarray], decimals: int) -> RecordedMotion:
+    """Return rows of one joint by its states (N,) at exact times, written with some decimals."""
+    half = np.full(1, 0.5 * 10.0**-decimals)
+    written = [*(np.round(values, decimals)[:, None] for values in states), *[None] * (3 - len(states))]
+    return RecordedMotion(t, *written, None, None, None, None, Resolution(0.0, half, half, half), "rows")
+
+
 def judged(motion: RecordedMotion, limits: Limits, blocks: int | None = None, **asked: object) -> Judgement:
     """Return the judgement of rows by limits, given whole or in blocks of some rows."""
     size = blocks or len(motion.t)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recorded_rows import rounded_rows
 
 from trajcli.findings import Finding
 from trajcli.judge.motion import Requirements, judge_motion
@@ -98,17 +99,7 @@ def test_dense_rows_whose_curve_alone_is_over_a_limit_are_over_it_where_somebody
     t = np.sort(np.append(np.arange(51) * 4e-3, 0.1601))
     since = np.maximum(t - 0.1212, 0.0)
     states = [0.5 * since**2, since, (since > 0).astype(float)]
-    half = np.full(1, 0.5e-8)
-    rows = RecordedMotion(
-        t,
-        *(np.round(values, 8)[:, None] for values in states),
-        None,
-        None,
-        None,
-        None,
-        Resolution(0.0, half, half, half),
-        "rows",
-    )
+    rows = rounded_rows(t, states, 8)
     limits = replace(unlimited(1), tcp=ToolLimits(acceleration=1.05))
     robot = Robot("arm", (Joint("a", type="prismatic"),), limits, "standard", np.eye(4), np.eye(4))
     joined = "quintic" if asked else None

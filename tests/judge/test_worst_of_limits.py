@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recorded_rows import bare_robot
+from recorded_rows import bare_robot, rounded_rows
 
 from trajcli.findings import Finding
 from trajcli.judge import joint_limits
@@ -282,18 +282,7 @@ def test_rows_that_state_more_than_the_way_to_the_end_allows_are_certain_whateve
     speed, start, left = 0.6, 0.2, (0.6 - beyond + 0.3) ** 2 / 12
     t = 1e-3 * np.arange(int((start - left) / speed * 1e3) + 1)
     q, qd = side * (1.0 - start + speed * t), np.full(t.size, side * speed)
-    half = np.full(1, 0.5 * 10.0**-decimals)
-    stated = [np.round(values, decimals)[:, None] for values in (q, qd, 0.0 * t)[:columns]]
-    rows = RecordedMotion(
-        t,
-        *[*stated, None][:3],
-        None,
-        None,
-        None,
-        None,
-        Resolution(0.0, half, half, half),
-        "rows",
-    )
+    rows = rounded_rows(t, [q, qd, 0.0 * t][:columns], decimals)
     limits = replace(
         unlimited(1), position=np.array([[-1.0, 1.0]]), velocity_by_position=np.array([[6.0, 0.3]])
     )

@@ -246,7 +246,8 @@ def view(
     check_page_name(str(output))
     if not (_is_finite(meshes) and meshes >= 0):
         raise InputError(f"meshes: expected megabytes, 0 at least, got {meshes!r}")
-    shown = (source,) if beside is None else (source, beside)
+    given = (source,) if beside is None else (source, beside)
+    shown = [motion if _is_path(motion) else _plan_of(motion) for motion in given]
     arm = _arm_of(shown, None if robot is None else str(robot))
     scenes = [_scene_of(motion, arm, meshes) for motion in shown]
     scene = scenes[0]
@@ -259,25 +260,28 @@ def view(
         out.write(page)
 
 
-def _arm_of(shown: Sequence[JobSource], robot: str | None) -> str | None:
-    """Return by what files of rows are judged: the robot that is named, else the file of the first job."""
+def _arm_of(shown: Sequence[JobSource], robot: str | None) -> str | Plan | None:
+    """Return by what files of rows are judged: the robot that is named, else the first job."""
     jobs = [source for source in shown if not _is_motion(source)]
     if robot is not None:
         if len(jobs) == len(shown):
             raise InputError("robot: it is for files of rows, and a job names its own", hint="leave it out")
         return robot
-    files = (str(job) for job in jobs if isinstance(job, Path) or (isinstance(job, str) and not is_yaml(job)))
-    return next(files, None)
+    return next((job if isinstance(job, Plan) else str(job) for job in jobs), None)
 
 
-def _scene_of(source: JobSource, arm: str | None, meshes: float) -> dict[str, Any]:
+def _scene_of(source: JobSource, arm: str | Plan | None, meshes: float) -> dict[str, Any]:
     """Return what the page shows of a plan, a job, or a file of rows."""
     with np.errstate(all="ignore"):
         if _is_motion(source):
-            from trajcli.output.delivery.delivered import judged_by
+            from trajcli.judge.file import CheckOptions
+            from trajcli.output.delivery.delivered import judged_by, judged_file
             from trajcli.player.recorded import scene_of_file
 
             opened = ByteSource(str(source))
+            if isinstance(arm, Plan):
+                by_plan = judged_file(opened, CheckOptions(), arm)
+                return scene_of_file(opened, arm.loaded.robot, by_plan, meshes)
             checked = None if arm is None else judged_by(opened, arm)
             return scene_of_file(opened, arm, checked, meshes)
         from trajcli.player.scene import scene_of_plan
@@ -405,11 +409,14 @@ def sweep(
     return made
 
 
+def _is_path(source: JobSource) -> bool:
+    """Return whether a source is the path of a file, and no text."""
+    return isinstance(source, Path) or (isinstance(source, str) and not is_yaml(source))
+
+
 def _is_motion(source: JobSource) -> bool:
     """Return whether a source is a file of rows, and no job."""
-    if isinstance(source, str) and is_yaml(source):
-        return False
-    return isinstance(source, str | Path) and holds_motion(str(source))
+    return _is_path(source) and holds_motion(str(source))
 
 
 def _plan_of(source: JobSource) -> Plan:

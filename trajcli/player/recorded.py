@@ -42,7 +42,7 @@ _SUFFIXES: dict[str | None, JointType] = {"deg": "revolute", "mm": "prismatic"}
 
 def scene_of_file(
     source: str | ByteSource,
-    robot_name: str | None = None,
+    arm: str | Robot | None = None,
     checked: CheckedFile | str | None = None,
     meshes: float = BUDGET,
 ) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def scene_of_file(
 
     Args:
         source: Its path; "-" is standard input.
-        robot_name: The arm: of the catalogue, a robot file, or a job.
+        arm: A robot, or its name: of the catalogue, of a robot file, or of a job.
         checked: The judgement of the file, or why there is none; None where nobody asked for one.
         meshes: How long the visual meshes of the arm's URDF may be, MB; with 0 none are shown.
 
@@ -59,7 +59,8 @@ def scene_of_file(
             no such robot.
         FileError: When a file cannot be read.
     """
-    robot = None if robot_name is None else open_sheet(robot_name).robot
+    name = arm if isinstance(arm, str) else None
+    robot = arm if isinstance(arm, Robot) else None if name is None else open_sheet(name).robot
     table = read_table(source, joints=None if robot is None else robot.joint_names)
     columns = [parse_column(name) for name in table.names]
     times = _times(table)
@@ -86,7 +87,7 @@ def scene_of_file(
         **{key: [] for key in ("events", "steps", "loads", "marks", "zones", "signals")},
         "notes": [*_judgement_notes(checked), *_notes(rows, kept, times)],
     }
-    return dressed(scene, *meshes_of_robot(robot_name, meshes))
+    return dressed(scene, *meshes_of_robot(name, meshes))
 
 
 def _of_job(checked: CheckedFile | str | None) -> Trajectory | None:
