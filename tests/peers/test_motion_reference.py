@@ -102,3 +102,15 @@ def test_the_fastest_motion_is_no_contradiction(tmp_path: Path, capfd: pytest.Ca
     _, view = check(tmp_path, rows, capfd, "--reference")
     assert view["reference"]["ruckig"]["ratio"] == pytest.approx(1.0, abs=1e-3)
     assert not [finding for finding in view["findings"] if finding["rule"] == "reference"]
+
+
+def test_a_stop_is_no_contradiction_though_its_end_is_rounded(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """From v = 1 with a = 2 it takes v / a = 0.5 s and v^2 / 2a = 0.25 rad: to 0.25 - 5e-13 it takes longer."""
+    t = np.linspace(0, 0.5, 51)[:, None]
+    q, qd = np.repeat(t - t**2, 2, axis=1), np.repeat(1 - 2 * t, 2, axis=1)
+    for rows in (np.concatenate([t, q, qd], axis=1), np.concatenate([t, 0.25 - q[::-1], qd[::-1]], axis=1)):
+        code, view = check(tmp_path, rows, capfd, "--reference")
+        assert code == 0, view["findings"]
+        assert view["reference"]["ruckig"]["ratio"] == pytest.approx(1, rel=1e-9)

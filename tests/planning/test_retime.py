@@ -246,3 +246,88 @@ def test_align_of_a_move_far_shorter_than_a_period() -> None:
     assert plan is not None
     assert [move.duration for move in plan.moves] == [0.001, 0.0]
     assert plan.verdict.passed
+
+
+def stretched(move: dict[str, Any], factor: float = 2.5) -> tuple[PlannedMove, PlannedMove]:
+    """Return a move of two joints from rest to rest, and the same in `factor` times the time."""
+    limits = {"velocity": [1, 2], "acceleration": [3, 5], "jerk": [40, 60]}
+    if move["planner"] == "trapezoid":
+        del limits["jerk"]
+    job = {"version": 1, "robot": "planar2r", "start": {"joints": [0.1, 0.9]}, "limits": limits}
+    (planned,) = plan_job(loaded({**job, "moves": [move]})).moves
+    return planned, with_duration(planned, factor * planned.duration)
+
+
+OVER, TO = [{"joints": [0.6, 1.1]}, {"joints": [0.2, 0.7]}], {"joints": [0.8, 1.4]}
+
+
+def test_a_stretched_law_and_its_phases_are_those_of_the_stretched_curve() -> None:
+    plain, longer = stretched({"planner": "trapezoid", "to": TO})
+    assert plain.planned.law is not None
+    assert longer.planned.law is not None
+    t = np.linspace(0, plain.duration, 50)
+    s = longer.planned.law.evaluate(2.5 * t)
+    chord = np.subtract(TO["joints"], [0.1, 0.9])
+    np.testing.assert_allclose(longer.planned.curve.evaluate(2.5 * t), [0.1, 0.9] + s * chord, atol=1e-12)
+    for one, other in zip(plain.planned.phases, longer.planned.phases, strict=True):
+        assert (other.start, other.end) == pytest.approx((2.5 * one.start, 2.5 * one.end), rel=1e-12)
+    twice = with_duration(longer, 2 * longer.duration)
+    assert twice.stretch == pytest.approx(5, rel=1e-12)
+
+
+def test_each_joint_of_a_stretched_move_arrives_when_it_says() -> None:
+    _, longer = stretched({"planner": "trapezoid", "to": TO, "synchronize": "none"})
+    assert longer.planned.arrivals is not None
+    for joint, time in enumerate(longer.planned.arrivals):
+        assert longer.planned.curve.evaluate(time)[joint] == pytest.approx(TO["joints"][joint], abs=1e-12)
+        assert abs(longer.planned.curve.evaluate(0.99 * time)[joint] - TO["joints"][joint]) > 1e-6
+
+
+@pytest.mark.parametrize("planner", ["spline", "blends", "time_optimal", "waypoints"])
+def test_a_stretched_move_passes_its_points_when_it_says(planner: str) -> None:
+    plain, longer = stretched({"planner": planner, "through": OVER, "to": TO})
+    one, other, curve = plain.planned, longer.planned, longer.planned.curve
+    for points in (other.via_points, other.virtual_points):
+        assert points is not None or planner != "spline"
+        if points is not None:
+            off = np.abs(curve.evaluate(np.clip(points.times, 0, longer.duration)) - points.points)
+            assert np.all(off <= points.missed + 1e-9)
+    assert other.origin == pytest.approx(2.5 * one.origin, rel=1e-12)
+    assert (one.origin > 0) == (planner == "blends")
+    if planner == "time_optimal":
+        assert other.phase_plane is not None
+        assert other.phase_plane.law.end == pytest.approx(longer.duration, rel=1e-12)
+    if planner == "waypoints":
+        assert one.certificate is not None
+        assert other.certificate is not None
+        np.testing.assert_allclose(other.certificate.off_times, 2.5 * one.certificate.off_times, rtol=1e-12)
+
+
+def test_the_tool_of_a_stretched_move_is_where_its_reference_says() -> None:
+    law = {"shape": "quintic", "duration": 1}
+    _, longer = stretched({"planner": "line", "to": {"xyz": [0.3, 0.2, 0]}, "law": law})
+    assert longer.planned.tool is not None
+    t = np.linspace(0, longer.duration, 9)
+    q = longer.planned.curve.evaluate(t)
+    lengths = [joint.a for joint in longer.robot.joints]
+    xy = sum(a * np.stack([np.cos(s), np.sin(s)], 1) for a, s in zip(lengths, np.cumsum(q, 1).T, strict=True))
+    np.testing.assert_allclose(longer.planned.tool.reference(t).poses[:, :2, 3], xy, atol=2e-6)
+
+
+def test_what_gravity_alone_exceeds_is_refused_and_a_fall_within_its_limits_is_not() -> None:
+    """A mass of 1 kg on 1 m held level takes 9.81 N m; who falls with g/2 there holds half of it."""
+    link = {"mass": 1, "com": [0, 0, 0], "inertia": [0] * 6}
+    robot = {"convention": "standard", "joints": [{"name": "a", "a": 1, "effort": [-20, 8], "link": link}]}
+    job: dict[str, Any] = {
+        "version": 1,
+        "robot": robot,
+        "gravity": [0, -9.81, 0],
+        "limits": {"effort": "robot"},
+        "start": {"joints": [-0.3]},
+        "moves": [{"planner": "quintic", "to": {"joints": [0.3]}, "duration": 3, "when_over_limit": "slow"}],
+    }
+    with pytest.raises(PlanningError) as caught:
+        plan_job(loaded(job))
+    (problem,) = caught.value.problems
+    assert problem.joint == "a"
+    assert "9.8" in problem.text()

@@ -57,6 +57,21 @@ def test_numbers_that_fit_or_have_their_unit_get_no_hint_about_units() -> None:
     assert hints_of(f"version: 1\nrobot: {{joints: 2}}\n{moving}") == []  # a conveyor may turn often
 
 
+def test_an_arc_that_goes_round_several_times_is_no_arc_in_degrees() -> None:
+    """Five turns are 31.4 rad: read in degrees they would be a tenth of one."""
+    helix = (
+        "{planner: arc, center: [0.5, 0.1, 0.3], axis: [0, 0, 1], angle: 31.4, pitch: 0.3, orientation: fixed"
+    )
+    text = (
+        "version: 1\nrobot: ur5e\nlimits: {tcp: {speed: 0.2, acceleration: 1}}\n"
+        "start: {xyz: [0.6, 0.1, 0.3], rpy: [3.14159, 0, 0]}\n"
+        f"moves: [{helix}}}]\n"
+    )
+    with pytest.raises(PlanningError) as caught:
+        plan_job(job_from_text(text, "job.yaml"))
+    assert all("degrees" not in (problem.hint or "") for problem in caught.value.problems)
+
+
 def test_an_unreachable_point_is_named_where_it_stands_in_the_units_of_the_job() -> None:
     text = (
         "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\npoints:\n  far: {xyz: [4000, 0, 300]}\n"

@@ -119,6 +119,19 @@ def test_positions_without_time_are_judged_at_a_rate(name: str, tmp_path: Path) 
         judged(file)
 
 
+def test_a_single_array_of_an_archive_is_what_its_name_says(tmp_path: Path) -> None:
+    """An array `q` holds no time, though its first column rises; one without a name is a table."""
+    table = np.column_stack([np.arange(5) / 10, np.zeros((5, 2))])
+    np.savez(tmp_path / "bare.npz", table)
+    assert judged(tmp_path / "bare.npz").rows == 5
+    for name in ("q", "joint_positions"):
+        np.savez(tmp_path / "named.npz", **{name: table})
+        with pytest.raises(InputError, match="no column is the time"):
+            open_motion(tmp_path / "named.npz", units="rad")
+        motion = open_motion(ByteSource(tmp_path / "named.npz", 10.0), units="rad").whole()
+        np.testing.assert_array_equal(motion.q, table)
+
+
 def test_a_rate_beside_a_time_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,q1,q2\n0,0,0\n1,0,0\n", encoding="utf-8")
     with pytest.raises(InputError, match="--rate is about rows without time, and time is one"):

@@ -52,8 +52,8 @@ class _Outline:
 def compared(checked: CheckedFile) -> tuple[Judgement, MotionReference]:
     """Return the judgement with what the comparison adds, and the comparison.
 
-    A motion that keeps its limits and is faster than any motion between its ends can be is a contradiction:
-    an error.
+    A motion from rest to rest that keeps its limits and is faster than any between its ends can be is a
+    contradiction: an error.
     """
     outline = _outline(checked.motion, checked.judgement.rows)
     duration = float(outline.last.t[0] - outline.first.t[0])
@@ -106,11 +106,11 @@ def _between_ends(outline: _Outline, robot: Robot, duration: float) -> tuple[flo
     start, end = _state(outline.first), _state(outline.last)
     bound = fastest_duration(start, end, robot.limits)
     report = bound_report(bound, duration, robot)
-    if isinstance(bound, NoBound):
-        return None, report
+    if isinstance(bound, NoBound) or not (start.at_rest and end.at_rest):
+        return None, report  # in motion a last bit less to go may take longer: there and back
     resolution = outline.first.resolution
     apart = end.position - start.position
-    rounding = 2 * (resolution.q + resolution.relative[0] * np.abs(end.position))
+    rounding = 2 * resolution.q + resolution.relative[0] * (np.abs(start.position) + np.abs(end.position))
     nearer = start.position + np.sign(apart) * np.maximum(np.abs(apart) - rounding, 0.0)
     least = fastest_duration(start, replace(end, position=nearer), robot.limits)
     late = 2 * (resolution.time + resolution.relative_time * abs(float(outline.last.t[0])))

@@ -30,7 +30,7 @@ from trajcli.trajectory import Span
 from trajcli.units import joint_units
 
 _MISSED = 1e-12  # rad or m: points that are passed at more are not gone through
-_BELOW = 1e-9  # relative to a bound: what is below it by less is rounding
+_BELOW = 1e-6  # relative to a bound: at a stop a last bit of the position is worth its root in time
 
 
 def reference_of(move: PlannedMove) -> ReferenceReport:

@@ -170,14 +170,18 @@ def open_archive(source: ByteSource, joints: int | None = None, *, timed: bool =
         InputError: When it is no archive of arrays, or holds no rows.
     """
     arrays = _arrays_of(source)
-    if len(arrays) == 1 and next(iter(arrays.values())).ndim > 1:
+    of_joints = [name for name in arrays if read_name(f"{name}1").quantity == "q"]
+    if len(arrays) == 1 and not of_joints and next(iter(arrays.values())).ndim > 1:
         array = next(iter(arrays.values()))
         names, notes = plain_names(source.file, array.shape, joints, timed=timed)
         columns = array.reshape(-1, array.shape[-1])
         return _rows_of(source.file, "npy", names, columns, [share_of(array.dtype)] * len(names), notes)
     wide = {name: array for name, array in arrays.items() if 2 <= array.ndim <= 3}
-    of_joints = [array for name, array in wide.items() if read_name(f"{name}1").quantity == "q"]
-    tables = of_joints or list(wide.values()) or [array for array in arrays.values() if array.ndim == 1]
+    tables = (
+        [wide[name] for name in of_joints if name in wide]
+        or list(wide.values())
+        or [array for array in arrays.values() if array.ndim == 1]
+    )
     if not tables or not tables[0].size:
         raise InputError(f"{source.file} holds no rows", hint=_LAYOUT)
     deep = tables[0].ndim > 2
