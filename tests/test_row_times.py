@@ -9,7 +9,7 @@ import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
-from trajcli.grids import ListedGrid, UniformGrid
+from trajcli.grids import KnotGrid, ListedGrid, UniformGrid, onto_breaks
 from trajcli.samples import sample
 from trajcli.trajectory import Span, State, Trajectory
 
@@ -96,3 +96,42 @@ def test_a_row_that_rounding_put_before_a_break_is_at_it(duration, when, roundin
     for time, speed in zip(times, (0.0, 1.0, 1.0), strict=True):
         (rows,) = sample(stepping(duration, when), ListedGrid(duration, np.array([time])), ["qd"])
         assert rows.tolist() == [[speed]]
+
+
+def test_an_end_just_behind_a_grid_time_takes_its_place_by_a_share_of_the_period():
+    """A millionth of a period of 2 s are 2000 ns: an end 1 us behind a row is that row, one 3 us behind is its own."""
+    for late, rows in ((1e-6, 6), (3e-6, 7), (-1e-6, 6)):
+        grid = UniformGrid(10 + late, 0.5)
+        ((times, local),) = grid.blocks()
+        assert (grid.count, times.size) == (rows, rows)
+        assert local[-1] == 10 + late
+
+
+def test_no_row_of_given_times_or_of_knots_lies_behind_the_end():
+    """0.1 + 0.2 - 0.1 is more than 0.2, and a knot in whole nanoseconds may be half of one behind."""
+    listed = ListedGrid(0.2, np.array([0.1, 0.1 + 0.2]), 0.1)
+    ((times, local),) = listed.blocks()
+    assert times[-1] == 0.1 + 0.2
+    assert (local[0], local[-1]) == (0.0, 0.2)
+    at = np.array([0, 1])
+    knots = KnotGrid(0.1234567886, np.array([0.0, 0.123456789]), at, np.zeros((3, 2, 1)), 5.0)
+    ((times, local),) = knots.blocks()
+    assert times.tolist() == [5.0, 5.0 + 0.123456789]
+    assert local.tolist() == [0.0, 0.1234567886]
+
+
+def test_states_of_knots_go_into_the_rows_and_orders_that_a_block_holds():
+    """Knots are rows 1, 3 and 4 of six; of a block from row 2 on with velocity and acceleration these are 3 and 4."""
+    states = np.arange(18.0).reshape(3, 3, 2) + 100
+    grid = KnotGrid(1.0, np.linspace(0, 1, 6), np.array([1, 3, 4]), states)
+    motion = np.zeros((3, 3, 2))
+    grid.put_states(2, [1, 2, 3], motion)
+    expected = np.zeros((3, 3, 2))
+    for row, knot in ((1, 1), (2, 2)):
+        expected[row, 0], expected[row, 1] = states[1, knot], states[2, knot]
+    np.testing.assert_array_equal(motion, expected)
+
+
+def test_the_start_stays_where_the_first_piece_is_shorter_than_rounding():
+    breaks = np.array([0.0, 5e-13, 1.0])
+    assert onto_breaks(np.array([0.0, 1e-13, 0.5, 1 - 5e-13]), breaks).tolist() == [0.0, 5e-13, 0.5, 1.0]

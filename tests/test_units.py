@@ -8,13 +8,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from trajcli.errors import Amount
 from trajcli.units import (
     Quantity,
     UnitError,
     Units,
+    amount_text,
+    effort_quantity,
+    effort_unit,
     factor,
+    joint_quantity,
+    joint_units,
     parse_quantity,
     to_user,
+    typeset,
     unit_name,
 )
 
@@ -51,6 +58,16 @@ PARSED = [
     ("2 min", TIME, 120.0),
     ("500 Hz", FREQUENCY, 500.0),
     ("1 kHz", FREQUENCY, 1000.0),
+    ("3.2 kg", Quantity("mass"), 3.2),
+    ("250 g", Quantity("mass"), 0.25),
+    ("400 N", Quantity("force"), 400.0),
+    ("0.4 kN", Quantity("force"), 400.0),
+    ("28 N m", Quantity("torque"), 28.0),
+    ("28 Nm", Quantity("torque"), 28.0),
+    ("1.5 kN m", Quantity("torque"), 1500.0),
+    ("1.5 kNm", Quantity("torque"), 1500.0),
+    ("0.02 kg m^2", Quantity("inertia"), 0.02),
+    ("0.02 kg m²", Quantity("inertia"), 0.02),
 ]
 
 
@@ -81,6 +98,12 @@ REFUSED = [
     ("١ deg", ANGLE, "expected an angle"),
     ("1e400 m", LENGTH, '"1e400 m" is too large'),
     ("9e307 rev", ANGLE, "is too large"),
+    (
+        "1,5 deg",
+        ANGLE,
+        'expected an angle such as "120 deg", got "1,5 deg": write 1.5, decimals have a point',
+    ),
+    ("28 N", Quantity("torque"), 'expected a torque such as "28 N m", got "28 N"'),
 ]
 
 
@@ -164,3 +187,33 @@ def test_quantities_and_units_that_do_not_exist() -> None:
             Quantity(dimension, order)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="no such units"):
         Units("grad")  # type: ignore[arg-type]
+
+
+def test_what_joints_measure() -> None:
+    """A slide has lengths and forces, all others have angles and torques."""
+    for order in range(4):
+        assert joint_quantity("revolute", order) == Quantity("angle", order)
+        assert joint_quantity("prismatic", order) == Quantity("length", order)
+    assert joint_units(["revolute", "prismatic"]) == ["rad", "m"]
+    assert joint_units(["prismatic", "revolute"], 3) == ["m/s^3", "rad/s^3"]
+    assert [effort_quantity(kind).dimension for kind in ("revolute", "prismatic")] == ["torque", "force"]
+    assert [effort_unit(kind) for kind in ("revolute", "prismatic")] == ["N m", "N"]
+    assert [typeset(unit) for unit in ("deg", "deg/s^2", "mm/s^3")] == ["deg", "deg/s²", "mm/s³"]
+
+
+@pytest.mark.parametrize(
+    ("amount", "text"),
+    [
+        (Amount(math.pi / 2, 1, 0), "90 deg/s"),
+        (Amount(0.25, 2, 1), "250 mm/s^2"),
+        (Amount(0.25, 3, dimension="length"), "250 mm/s^3"),
+        (Amount(math.pi, dimension="angle"), "180 deg"),
+        (Amount(0.5), "0.5 s"),
+        (Amount((0.1, -0.2), dimension="length"), "[100, -200] mm"),
+        (Amount(28.0, joint=0, unit="N m"), "28 N m"),
+        (Amount(math.inf, 1, 0), "unlimited"),
+        (Amount(-math.inf, 0, 1), "unlimited"),
+    ],
+)
+def test_amounts_of_messages_are_said_in_the_units_of_the_user(amount: Amount, text: str) -> None:
+    assert amount_text(amount, ["revolute", "prismatic"], DEG_MM) == text

@@ -15,7 +15,7 @@ from trajcli.errors import InputError, PlanningError
 from trajcli.kinematics.robot import Limits
 from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.planning.retime import with_duration
+from trajcli.planning.retime import next_periods, with_duration
 
 SEEDS = st.integers(0, 2**32 - 1)
 few = settings(max_examples=15, deadline=None)
@@ -314,20 +314,89 @@ def test_the_tool_of_a_stretched_move_is_where_its_reference_says() -> None:
     np.testing.assert_allclose(longer.planned.tool.reference(t).poses[:, :2, 3], xy, atol=2e-6)
 
 
-def test_what_gravity_alone_exceeds_is_refused_and_a_fall_within_its_limits_is_not() -> None:
-    """A mass of 1 kg on 1 m held level takes 9.81 N m; who falls with g/2 there holds half of it."""
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_gravity_alone_exceeds_is_refused_on_either_side(sign: int) -> None:
+    """A mass of 1 kg on 1 m held level takes 9.81 N m, upwards or, hanging from above, downwards."""
     link = {"mass": 1, "com": [0, 0, 0], "inertia": [0] * 6}
-    robot = {"convention": "standard", "joints": [{"name": "a", "a": 1, "effort": [-20, 8], "link": link}]}
+    bound = [-20, 8] if sign > 0 else [-8, 20]
+    robot = {"convention": "standard", "joints": [{"name": "a", "a": 1, "effort": bound, "link": link}]}
     job: dict[str, Any] = {
         "version": 1,
         "robot": robot,
-        "gravity": [0, -9.81, 0],
+        "gravity": [0, -9.81 * sign, 0],
         "limits": {"effort": "robot"},
         "start": {"joints": [-0.3]},
-        "moves": [{"planner": "quintic", "to": {"joints": [0.3]}, "duration": 3, "when_over_limit": "slow"}],
+        "moves": [{"planner": "quintic", "to": {"joints": [0.3]}, "duration": 3}],
     }
     with pytest.raises(PlanningError) as caught:
         plan_job(loaded(job))
     (problem,) = caught.value.problems
     assert problem.joint == "a"
-    assert "9.8" in problem.text()
+    assert problem.text().startswith(
+        f"move 0 (quintic): gravity alone takes {9.81 * sign:g} N m of a at t = 1.5 s"
+    )
+    assert "1.81 N m more than its effort limit" in problem.text()
+
+
+def test_a_duration_that_is_too_short_becomes_the_shortest_that_there_is() -> None:
+    """A trapezoid by 2 rad with v = 1 and a = 3 lasts 2 + 1/3 s."""
+    move = {"planner": "trapezoid", "to": {"joints": [2, 1]}, "duration": 0.5}
+    job = {"version": 1, "robot": {"joints": 2}, "limits": {"velocity": 1, "acceleration": 3}}
+    job |= {"start": {"joints": [0, 0]}, "moves": [move], "when_over_limit": "slow"}
+    plan = plan_of(job)
+    assert plan is not None
+    (slowed,), (event,) = plan.moves, plan.events
+    assert slowed.duration == pytest.approx(7 / 3, rel=1e-12)
+    assert slowed.stretch == pytest.approx(14 / 3, rel=1e-12)
+    assert (slowed.over_limit, event.kind, event.move) == ("slow", "slowed", 0)
+    assert event.message.startswith("stretched 4.66667 times, from 0.5 s to 2.33333333 s: ")
+    with pytest.raises(PlanningError):
+        plan_job(loaded({**job, "when_over_limit": "error"}))
+
+
+def test_what_a_stretched_move_is_said_to_keep_is_the_limit_that_asks_for_most() -> None:
+    """By 0.1 and 3 rad in half a second: 15/8 D/T is 0.375 of one limit, 5.625 times the other, jerk a little."""
+    move = {"planner": "quintic", "to": {"joints": [1, 3]}, "duration": 0.5}
+    job = {"version": 1, "robot": {"joints": 2}, "limits": {"velocity": [1, 2]}}
+    job |= {"start": {"joints": [0, 0]}, "moves": [move], "when_over_limit": "slow"}
+    plan = plan_of(job)
+    assert plan is not None
+    (event,) = plan.events
+    assert event.message == "stretched 5.625 times, from 0.5 s to 2.8125 s, to keep the velocity limit of j2"
+    job["limits"] = {"position": [[-9, 9], [-9, 1]], "velocity": 1}
+    over = plan_of(job)
+    assert over is not None
+    assert over.moves[0].not_slowed is not None
+    assert over.moves[0].not_slowed.message == "change the target, the start or the limit"
+
+
+def test_whole_periods_of_durations_that_sums_have_rounded() -> None:
+    assert next_periods(0.1 + 0.2, 10) == 3
+    assert next_periods(0.3 * (1 + 1e-6), 10) == 4
+    assert next_periods(0.0, 10) == 1
+
+
+def test_align_passes_over_durations_that_no_motion_has() -> None:
+    """From and to 1 rad/s over 0.5 rad with 1 rad/s^2: at most 2 - sqrt(2) s, or there and back again."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 2, "acceleration": 1, "jerk": None},
+        "start": {"joints": [0], "velocity": [1]},
+        "moves": [{"planner": "jerk_limited", "to": {"joints": [0.5], "velocity": [1]}}],
+        "output": {"align": True, "rate": 1},
+    }
+    plan = plan_of(job)
+    assert plan is not None
+    assert plan.verdict.passed
+    assert plan.moves[0].duration == pytest.approx(4, abs=1e-12)  # two turns take at least 2 + sqrt(2)
+
+
+def test_stretches_of_a_move_in_motion_multiply() -> None:
+    start = {"joints": [0], "velocity": [0.5]}
+    job = {"version": 1, "robot": {"joints": 1}, "start": start}
+    job["moves"] = [{"planner": "cubic", "to": {"joints": [1]}, "duration": 1}]
+    (move,) = plan_job(loaded(job)).moves
+    twice = with_duration(with_duration(move, 2.0), 3.0)
+    assert (twice.duration, twice.stretch) == (3.0, pytest.approx(3.0, rel=1e-12))
+    assert twice.planned.curve.evaluate(0.0, 1)[0] == pytest.approx(0.5, rel=1e-12)

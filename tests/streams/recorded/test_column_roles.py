@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from trajcli.errors import InputError
+from trajcli.streams.recorded.column_roles import NamedFile, assign_roles
 from trajcli.streams.recorded_motion import MotionFile, open_motion
 
 
@@ -74,3 +75,19 @@ def test_a_message_about_other_joints_is_refused(tmp_path: Path) -> None:
     assert "foo, bar; rows that `trajcli convert` makes of it number them" in str(
         caught.value.problems[0].hint
     )
+
+
+@pytest.mark.parametrize("quantity", ["q", "qd", "qdd", "tau"])
+def test_columns_of_one_joint_are_told_apart_by_the_quantity_that_the_hint_names(quantity: str) -> None:
+    names = ("t", "q1", "q2", f"{quantity}1_deg", f"{quantity}1_rad", f"{quantity}2_deg")
+    names = names if quantity != "q" else (names[0], *names[3:])
+    file = NamedFile("in.csv", names, lambda name: None)
+    with pytest.raises(InputError) as caught:
+        assign_roles(file)
+    hint = str(caught.value.problems[0].hint)
+    said = hint.rpartition("--columns ")[2]
+    for number in (1, 2):
+        said = said.replace("NAME", f"{quantity}{number}_deg", 1)
+    roles = assign_roles(file, said)
+    assert [names[index] for index in roles.joints[quantity]] == [f"{quantity}1_deg", f"{quantity}2_deg"]
+    assert [names[index] for index in roles.joints["q"]][0].startswith("q1")

@@ -182,7 +182,7 @@ class _Assignment:
             read = self._names[index]
             own: int | str = len(group) + 1 if read.joint is None else read.joint
             own = self._number_of(read.text, value) if read.quantity is None else own
-            self._take(group, own if joint is None else joint, index)
+            self._take(quantity, group, own if joint is None else joint, index)
             unit = read.unit if value == read.text else split_unit(value)[1] or read.unit
             self._names[index] = replace(read, quantity=quantity, unit=unit)
         self._chosen.setdefault(quantity, {}).update(group)
@@ -224,15 +224,16 @@ class _Assignment:
             if read.quantity != quantity or read.joint is None or index in taken:
                 continue
             if isinstance(read.joint, int) or not numbered or read.joint in self._joints:
-                self._take(groups.setdefault((read.kind, read.stem), {}), read.joint, index)
+                self._take(quantity, groups.setdefault((read.kind, read.stem), {}), read.joint, index)
         whole = {key: group for key, group in groups.items() if key[0] not in _BESIDE}
         return whole or groups
 
-    def _take(self, group: ColumnGroup, joint: int | str, index: int) -> None:
+    def _take(self, quantity: str, group: ColumnGroup, joint: int | str, index: int) -> None:
         """Put a column into a group; refused where it has one of the joint."""
         if joint in group:
             names = [self._file.names[k] for k in (group[joint], index)]
-            hint = "leave one out, or name a column for each joint: --columns q1=NAME,q2=NAME"
+            named = f"{quantity}1=NAME,{quantity}2=NAME"
+            hint = f"leave one out, or name a column for each joint: --columns {named}"
             raise self._file.wrong(f"two columns are of one joint: {', '.join(names)}", hint, names[1])
         group[joint] = index
 
