@@ -137,9 +137,7 @@ def effort_quantity(joint_type: str) -> Quantity:
 
 def joint_units(joint_types: Sequence[str], order: int = 0) -> list[str]:
     """Return the SI unit of each joint's position, or of its time derivative of an order."""
-    return [
-        ("m" if kind == "prismatic" else "rad") + ("", "/s", "/s^2", "/s^3")[order] for kind in joint_types
-    ]
+    return [unit_name(joint_quantity(kind, order), Units()) for kind in joint_types]
 
 
 def effort_unit(joint_type: str) -> str:

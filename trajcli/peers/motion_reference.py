@@ -107,10 +107,10 @@ def _between_ends(outline: _Outline, robot: Robot, duration: float) -> tuple[flo
     bound = fastest_duration(start, end, robot.limits)
     report = bound_report(bound, duration, robot)
     if isinstance(bound, NoBound) or not (start.at_rest and end.at_rest):
-        return None, report  # in motion a last bit less to go may take longer: there and back
+        return None, report  # who is in motion may pass an end that is nearer
     resolution = outline.first.resolution
     apart = end.position - start.position
-    rounding = 2 * resolution.q + resolution.relative[0] * (np.abs(start.position) + np.abs(end.position))
+    rounding = 2 * resolution.q + resolution.relative[0] * (abs(start.position) + abs(end.position))
     nearer = start.position + np.sign(apart) * np.maximum(np.abs(apart) - rounding, 0.0)
     least = fastest_duration(start, replace(end, position=nearer), robot.limits)
     late = 2 * (resolution.time + resolution.relative_time * abs(float(outline.last.t[0])))

@@ -30,7 +30,7 @@ from trajcli.trajectory import Span
 from trajcli.units import joint_units
 
 _MISSED = 1e-12  # rad or m: points that are passed at more are not gone through
-_BELOW = 1e-6  # relative to a bound: at a stop a last bit of the position is worth its root in time
+_BELOW = 1e-6  # relative to a bound: at a stop a last bit of the way is worth its root
 
 
 def reference_of(move: PlannedMove) -> ReferenceReport:

@@ -90,4 +90,4 @@ def test_columns_of_one_joint_are_told_apart_by_the_quantity_that_the_hint_names
         said = said.replace("NAME", f"{quantity}{number}_deg", 1)
     roles = assign_roles(file, said)
     assert [names[index] for index in roles.joints[quantity]] == [f"{quantity}1_deg", f"{quantity}2_deg"]
-    assert [names[index] for index in roles.joints["q"]][0].startswith("q1")
+    assert names[roles.joints["q"][0]].startswith("q1")
