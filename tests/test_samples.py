@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -13,9 +14,9 @@ from scipy.interpolate import PPoly
 from trajcli.columns import columns_of
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.errors import InputError
-from trajcli.grids import ListedGrid, UniformGrid
+from trajcli.grids import KnotGrid, ListedGrid, UniformGrid
 from trajcli.samples import sample
-from trajcli.trajectory import Span, Trajectory, resting
+from trajcli.trajectory import Signal, SignalChange, Span, Trajectory, resting
 from trajcli.units import Units
 
 ALL = ("t", "q", "qd", "qdd", "qddd", "move")
@@ -291,3 +292,58 @@ def test_rows_do_not_depend_on_the_size_of_blocks(seed):
         np.concatenate([*sample(trajectory_of(curve), grid, ALL, size=size)]) for size in (1, 2, 5, 4096)
     ]
     assert all(np.array_equal(rows, found[-1]) for rows in found)
+
+
+def test_knots_stand_in_the_units_of_each_joint_block_by_block():
+    """States of knots are in SI; they replace what the curve says there, in every block."""
+    curve = random_curve(3, pieces=4, n=2)
+    trajectory = trajectory_of(curve, types=("revolute", "prismatic"))
+    local = np.linspace(0, curve.end, 9)
+    at = np.array([0, 3, 4, 8])
+    states = np.random.default_rng(1).normal(size=(3, 4, 2))
+    grid = KnotGrid(curve.end, local, at, states)
+    factors = np.array([np.pi / 180, 1e-3])
+    rows = rows_of(trajectory, grid, ("q", "qd", "qdd"), Units("deg", "mm"), size=2).reshape(9, 3, 2)
+    expected = np.stack([curve.evaluate(local, order) for order in range(3)], axis=1)
+    expected[at] = states.transpose(1, 0, 2)
+    np.testing.assert_allclose(rows, expected / factors, rtol=1e-9, atol=1e-9)
+
+
+def test_numbers_of_moves_zones_and_paths_at_borders_that_rounding_has_missed():
+    """Half a picosecond before a border is at it; entries of the job that move nothing leave gaps in the numbers."""
+    curve = random_curve(4, pieces=2, n=1)
+    border = float(curve.breaks[1])
+    law = PiecewisePolynomial(np.array([0.0, curve.end - border]), np.array([[[2.0]], [[0.0]]]))
+    spans = (Span(0, "quintic", 0.0, border, 1), Span(2, "line", border, curve.end, 1))
+    trajectory = replace(
+        trajectory_of(curve),
+        spans=spans,
+        laws=(None, law),
+        zones=((0.2 * border, 0.5 * border), (border, 1.1 * border)),
+    )
+    times = np.array(
+        [0.0, 0.2 * border - 5e-13, 0.3 * border, 0.5 * border - 5e-13, border - 5e-13, curve.end]
+    )
+    for size in (1, 9):
+        rows = rows_of(trajectory, ListedGrid(curve.end, times), ("move", "zone", "path"), size=size)
+        assert rows[:, 0].tolist() == [0, 0, 0, 0, 2, 2]
+        assert rows[:, 1].tolist() == [0, 1, 1, 0, 2, 0]
+        s = np.maximum(times - border, 0.0)
+        np.testing.assert_allclose(rows[:, 2], np.where(rows[:, 0] == 2, 2 * s, 0), atol=1e-12)
+        np.testing.assert_allclose(rows[:, 3], np.where(rows[:, 0] == 2, 2, 0), atol=1e-12)
+        in_mm = rows_of(trajectory, ListedGrid(curve.end, times), ("path",), Units("deg", "mm"), size=size)
+        np.testing.assert_allclose(in_mm, 1000 * rows[:, 2:], rtol=1e-12, atol=1e-12)
+
+
+def test_signals_and_laws_count_from_the_start_whatever_the_time_of_the_first_row():
+    """The law turns at 0.3 s of the second move, half a picosecond behind a row; where it ends its end counts."""
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.zeros((1, 1, 1)))
+    law = PiecewisePolynomial(np.array([0.0, 0.3, 0.5 - 1e-12]), np.array([[[1.0], [3.0]], [[0.0], [0.3]]]))
+    spans = (Span(0, "hold", 0.0, 0.5, 1), Span(1, "line", 0.5, 1.0, 1))
+    signal = Signal("grip", (SignalChange(0.25, 1.0, 0), SignalChange(0.8, 0.5, 1)))
+    trajectory = replace(trajectory_of(curve), spans=spans, laws=(None, law), signals=(signal,))
+    local = np.array([0.0, 0.25 - 5e-13, 0.5, 0.8 - 5e-13, 1.0])
+    rows = rows_of(trajectory, ListedGrid(1.0, 100 + local, 100.0), ("signals", "path"))
+    assert rows[:, 0].tolist() == [0, 1, 1, 0.5, 0.5]
+    np.testing.assert_allclose(rows[:, 1], [0, 0, 0, 0.3, 0.9], atol=1e-9)
+    assert rows[:, 2].tolist() == [0, 0, 1, 3, 3]

@@ -187,6 +187,8 @@ def test_quantities_and_units_that_do_not_exist() -> None:
             Quantity(dimension, order)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="no such units"):
         Units("grad")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="no such units"):
+        Units("rad", "cm")  # type: ignore[arg-type]
 
 
 def test_what_joints_measure() -> None:

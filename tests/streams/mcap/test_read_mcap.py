@@ -327,7 +327,8 @@ def test_unknown_compression_schema_and_encoding_are_named(tmp_path: Path) -> No
     assert "compressed by 'br', at byte" in refused(raw_log(path, compression="br", content=b"x" * 20))
     assert "cannot be unpacked" in refused(raw_log(path, compression="zstd", content=b"x" * 20))
     assert "cannot be unpacked" in refused(raw_log(path, compression="lz4", content=b"x" * 20))
-    assert "encoded as 'json'" in refused(raw_log(path, encoding="json"), "/x")
+    for topic in ("/x", None):
+        assert "encoded as 'json'" in refused(raw_log(path, encoding="json"), topic)
     assert "holds acme/msg/State" in refused(raw_log(path, schema="acme/msg/State"), "/x")
 
 

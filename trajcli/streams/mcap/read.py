@@ -225,9 +225,11 @@ def _channels(known: LogRecords, topic: str) -> set[int]:
 def _chosen(known: LogRecords, topic: str | None) -> str:
     every = {channel.topic: number for number, channel in known.channels.items()}
     fit = [name for name, number in every.items() if _type(known, number) in _READ]
+    if topic is None and JOINT_STATES in fit:
+        topic = JOINT_STATES
+    elif topic is None and len(fit) == 1:
+        topic = fit[0]
     if topic is None:
-        if JOINT_STATES in fit or len(fit) == 1:
-            return JOINT_STATES if JOINT_STATES in fit else fit[0]
         what = "several topics with joints" if fit else "no topic with joints"
         hint = valid_names(fit, "name one with --topic") or valid_names(every, "its topics")
         raise InputError(f"{known.file} has {what}: of {' or '.join(_READ)}", hint=hint)
