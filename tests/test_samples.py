@@ -266,6 +266,8 @@ def test_a_row_beside_a_ramp_too_short_for_stamps_has_the_acceleration_outside_o
     expected = [1 / ramp if told else -0.6, 0.0, -1 / ramp if told else 0.6]
     np.testing.assert_allclose(rows[[0, 1, -1], 0], expected, rtol=1e-6, atol=1e-6)
     assert abs(rows[[0, -1], 1] - (0.0 if told else 0.6)).max() < 1e-6
+    speeds = rows_of(trajectory_of(curve), UniformGrid(curve.end, 1.0), ("qd",), size=2)[[0, -1], 0]
+    np.testing.assert_allclose(speeds, 0.0, atol=0.05)  # before the first ramp and behind the last one
 
 
 @pytest.mark.parametrize("off", [2e-10, 5e-10, 9e-10, 1.5e-9])

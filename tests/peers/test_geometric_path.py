@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import trajcli
 from trajcli.curves.piecewise import PiecewisePolynomial
@@ -130,3 +131,52 @@ def test_breaches_are_the_extremes_of_the_polynomials() -> None:
     assert [one.time for one in found[:2]] == [pytest.approx(1.0), pytest.approx(0.0)]
     wide = Limits(free, np.array([[-1.0, 2.0]]), np.array([[-6.0, 6.0]]), np.array([[-6.0, 6.0]]))
     assert breaches_of(curve, wide, (0, 1, 2, 3)) == ()
+
+
+@pytest.mark.parametrize(("turn", "corner"), [(50.0, False), (70.0, True), (-70.0, True), (180.0, True)])
+def test_a_corner_is_where_the_path_turns_by_more_than_sixty_degrees(turn: float, corner: bool) -> None:
+    """Two sides of 1 and 2 rad, each of even steps: every point is one of the path, also that of the corner."""
+    angle = np.deg2rad(turn)
+    first = np.linspace(0, 1, 101)[:, None] * [1.0, 0.0]
+    second = first[-1] + np.linspace(0, 2, 201)[1:, None] * [np.cos(angle), np.sin(angle)]
+    path = path_of_points(np.concatenate([first, second]))
+    assert path is not None
+    assert path.stops.tolist() == (pytest.approx([1.0], rel=1e-12) if corner else [])
+    if corner:
+        assert path.path.end == pytest.approx(3.0, rel=1e-12)
+        assert path.deviation < 1e-12
+        np.testing.assert_allclose(path.path.evaluate(1.0 - 1e-9), [1, 0], atol=2e-9)
+
+
+def test_the_deviation_is_the_largest_distance_of_all_parts_however_joint_space_is_turned() -> None:
+    """Waves too fine for 1024 knots are missed; a straight line behind their corner is not."""
+    x = np.linspace(0, 1, 8001)
+    waves = np.stack([x, 2e-4 * np.sin(2000 * x), 0 * x], axis=1)
+    sides = np.concatenate([waves, waves[-1] + np.linspace(0, 1, 1001)[1:, None] * [-0.1, 1.0, 0.0]])
+    path = path_of_points(sides)
+    assert path is not None
+    assert path.stops.size == 1
+    assert 1e-5 < path.deviation < 4e-4
+    turned = path_of_points(sides @ Rotation.from_rotvec([0.5, -0.4, 0.8]).as_matrix().T)
+    assert turned is not None
+    assert turned.deviation == pytest.approx(path.deviation, rel=1e-6)
+    fewer = path_of_points(np.stack([x, 1e-2 * np.sin(60 * x)], axis=1))
+    assert fewer is not None
+    assert fewer.deviation < 1e-6
+    assert 64 < fewer.path.pieces < 600
+
+
+def test_points_along_the_path_at_other_distances_deviate_by_nothing() -> None:
+    """A straight line whose points crowd at its beginning: none is beside it, though knots lie elsewhere."""
+    s = np.linspace(0, 1, 5000) ** 3
+    path = path_of_points(s[:, None] * [3.0, 4.0])
+    assert path is not None
+    assert path.deviation < 1e-12
+    assert path.path.end == pytest.approx(5.0, rel=1e-12)
+    np.testing.assert_allclose(path.path.evaluate(np.array([0.0, 5.0])), [[0, 0], [3, 4]], atol=1e-12)
+
+
+def test_what_is_shorter_than_a_billionth_is_no_motion() -> None:
+    line = np.linspace(0, 1, 20)[:, None]
+    assert path_of_points(0.9e-9 * line) is None
+    assert path_of_points(1e-6 * line) is not None
