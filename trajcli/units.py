@@ -207,13 +207,13 @@ def parse_quantity(text: str, quantity: Quantity) -> float:
 
 def _scale(unit: str, quantity: Quantity) -> float | None:
     """Return the SI value of one `unit`; None when it does not measure the quantity."""
-    known = _UNITS.get(quantity.dimension, {})
+    table = _UNITS.get(quantity.dimension, {})
     if quantity.order == 0:
-        return known.get(unit)
+        return table.get(unit)
     rate = _RATE.fullmatch(_ALIASES.get(unit, unit))
-    if rate is None or _EXPONENTS[rate[3]] != quantity.order or rate[1] not in known or rate[2] not in _TIMES:
+    if rate is None or _EXPONENTS[rate[3]] != quantity.order or rate[1] not in table or rate[2] not in _TIMES:
         return None
-    return known[rate[1]] / _TIMES[rate[2]] ** quantity.order
+    return table[rate[1]] / _TIMES[rate[2]] ** quantity.order
 
 
 def _unknown(unit: str, quantity: Quantity) -> str:

@@ -121,6 +121,17 @@ def test_a_swing_is_not_stretched_as_a_whole(tcp: dict[str, float], most: float)
     assert all("at most" in event.message for event in bounds)
 
 
+@pytest.mark.parametrize("least", [0.5, 1.2])
+def test_a_swing_within_a_limit_of_the_tool_lasts_as_long_as_it_is_to_last_at_least(least: float) -> None:
+    """Within the speed it lasts 1.18 s, and 1.641 s where it is stretched alike everywhere."""
+    (move,) = UR5E_SWING["moves"]
+    swing = UR5E_SWING | {"limits": {"acceleration": 800, "jerk": 8000, "tcp": {"speed": 1000}}}
+    plan = plan_job(loaded(swing | {"moves": [move | {"minimum_duration": least}]}))
+    assert plan.verdict.passed
+    assert plan.trajectory.duration == pytest.approx(max(least, 1.175), rel=1e-9 if least > 1 else 0.01)
+    assert "within_tool_limits" in {event.kind for event in plan.events}
+
+
 @pytest.mark.parametrize("planner", ["jerk_limited", "time_optimal"])
 @pytest.mark.parametrize("of_joint", [{}, {"jerk": 300}])
 def test_the_fastest_law_within_an_angular_jerk(planner: str, of_joint: dict[str, float]) -> None:
