@@ -47,3 +47,14 @@ def test_a_short_link_is_a_link(second, closed):
     rows = [{"type": "R", "theta": 0.0, "d": 0.0, "a": a, "alpha": 0.0} for a in (0.3, second)]
     robot = oracle.robot_of({"dh": rows, "convention": "std"})
     assert (method_for(robot).solve is not None) == closed
+
+
+@pytest.mark.parametrize(("behind", "closed"), [(-0.3, False), (-0.3 + 3e-7, True)])
+def test_a_tip_that_rounding_keeps_off_an_axis_is_on_it(behind, closed):
+    """0.1 + 0.2 is 0.3 but for rounding: the second joint does not move the tip, and its row is no zero."""
+    rows = [{"type": "R", "theta": 0.0, "d": 0.0, "a": a, "alpha": 0.0} for a in (0.3, 0.1 + 0.2)]
+    tool = np.eye(4)
+    tool[0, 3] = behind
+    robot = oracle.robot_of({"dh": rows, "convention": "std", "tool": tool})
+    assert np.abs(jacobian(robot, [0.3, 0.4])[:3, 1]).max() > 0.0
+    assert (method_for(robot).solve is not None) == closed

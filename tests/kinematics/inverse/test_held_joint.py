@@ -174,3 +174,40 @@ def test_where_the_arm_stands_is_the_nearest_answer_whichever_joints_are_at_thei
     q[joints] = PANDA.limits.position[joints, end]
     solutions = solve(PANDA, pose_target(forward(PANDA, q)), q)
     np.testing.assert_allclose(solutions.joints[solutions.nearest(q)], q, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_all_of_the_last_row_is_left_to_the_others(convention, sign: int) -> None:
+    """Its angles and lengths, standard rows with a screw behind the joint, and a small offset of the tool."""
+    last = replace(STANDARD[-1], theta=0.3, d=0.1, a=0.05, alpha=0.4, sign=sign)
+    robot = replace(OTHER, joints=(*STANDARD[:-1], last), convention=convention)
+    for each in (robot, replace(PANDA, tool=moved((0.0, 4e-4, 0.0), (0.0, 0.0, 0.0)))):
+        held, q = without_last_joint(each), random_joints(each, 5)
+        assert held is not None
+        left = poses_for_the_others(each, forward(each, q), q[:, -1])
+        np.testing.assert_allclose(forward(held, q[:, :-1]), left, rtol=0, atol=1e-14)
+
+
+def test_only_the_last_of_seven_is_held_and_only_where_it_turns() -> None:
+    limits = replace(PANDA.limits, position=np.arange(14.0).reshape(7, 2))
+    held = without_last_joint(replace(PANDA, limits=limits))
+    assert held is not None
+    assert held.joint_names == PANDA.joint_names[:6]
+    assert held.limits.position.tolist() == limits.position[:6].tolist()
+    slide = replace(PANDA, joints=(*PANDA.joints[:-1], replace(PANDA.joints[-1], type="prismatic")))
+    assert without_last_joint(slide) is None
+    assert without_last_joint(held) is None
+
+
+def test_methods_say_which_joint_is_held_and_why_there_is_no_closed_form() -> None:
+    """A beta of either sign and of any row makes axes almost parallel: no closed form."""
+    assert f"with {PANDA.joint_names[-1]} held" in method_for(PANDA).reason
+    held = without_last_joint(PANDA)
+    assert held is not None
+    for beta in (1e-4, -1e-4):
+        for robot, said in ((held, "no closed form for this chain (RRRRRR)"), (PANDA, "7 joints are more")):
+            joints = tuple(replace(joint, beta=beta * (k == 1)) for k, joint in enumerate(robot.joints))
+            method = method_for(replace(robot, joints=joints))
+            assert method.family == "numeric"
+            assert said in method.reason

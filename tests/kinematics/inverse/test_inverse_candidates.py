@@ -111,3 +111,36 @@ def test_a_turn_is_taken_back_on_either_side(value, bounds):
     joints = np.full((2, 2, 3), value)
     choose_turns(robot, joints, None)
     assert joints == pytest.approx(value - np.copysign(2.0 * np.pi, value))
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.parametrize("beside", [3e-9, 3e-8])
+@pytest.mark.parametrize("name", ["elbow", "wrist over elbow", "SCARA"])
+def test_what_is_degenerate_does_not_depend_on_the_unit_of_lengths(name, beside, scale):
+    """A point beside the axis of the shoulder or the elbow counts as on it by the length of the arm."""
+    robot = arm(name)
+    rows = [replace(joint, a=scale * joint.a, d=scale * joint.d) for joint in robot.joints]
+    large = replace(robot, joints=tuple(rows))
+    q = random_joints(robot, np.random.default_rng(4), 8)
+    poses = forward(robot, q)
+    hub = forward(robot, np.zeros(len(rows)))[:3, 3] * [0.0, 0.0, 1.0]
+    poses[:4, :3, 3] = hub + beside * axis_geometry(robot).length * np.eye(3)[0]
+    if name == "wrist over elbow":  # its centre stands over the first axis
+        tip = [0.02, 0.0, 0.1]
+        poses[:4, :3, 3] += np.einsum("kij,j->ki", poses[:4, :3, :3], tip)
+    moved = poses.copy()
+    moved[:, :3, 3] *= scale
+    found = [
+        candidates(each, axis_geometry(each), method_for(each), at)
+        for each, at in ((robot, poses), (large, moved))
+    ]
+    assert found[0].degenerate.tolist() == found[1].degenerate.tolist()
+    assert found[0].degenerate[:4].all() == (beside < 1e-8)
+    assert not found[0].degenerate[4:].any()
+
+
+def test_a_method_without_a_closed_form_is_refused():
+    robot = arm("UR")
+    none = replace(method_for(robot), solve=None)
+    with pytest.raises(ValueError, match="has no closed form"):
+        candidates(robot, axis_geometry(robot), none, forward(robot, np.ones((2, 6))))

@@ -1,8 +1,8 @@
 """Numeric inverse kinematics of any chain: damped Newton steps from many seeds of all targets at once.
 
 Every step solves (J^T J + m I) dq = J^T e for all running rows together, with the damping m = |e|^2 / 2: it
-vanishes with the error, so that the end is quadratic, and keeps steps short where the arm is singular. With
-more joints than coordinates the same step is J^T (J J^T + m I)^-1 e, the shortest one. Lengths are divided by
+vanishes with the error, so that the end is quadratic, and keeps steps below sqrt(1/2) everywhere. With more
+joints than coordinates the same step is J^T (J J^T + m I)^-1 e, the shortest one. Lengths are divided by
 the arm's characteristic length.
 
 An arm with as many joints as coordinates has finitely many solutions: limits do not enter the search, and
@@ -128,9 +128,7 @@ def descend(
         running, values = running[~done], values[~done]
         if not len(running):
             break
-        step = damped_step(errors[~done], slopes[~done], 0.5 * square[~done] + _FLOOR)
-        longest = np.abs(step).max(axis=1, keepdims=True)
-        values = values + step * np.minimum(1.0, _LONGEST / np.maximum(longest, _LONGEST))
+        values = values + damped_step(errors[~done], slopes[~done], 0.5 * square[~done] + _FLOOR)
         result[running] = values if bounds is None else np.clip(values, bounds[:, 0], bounds[:, 1])
     if len(robot.joints) < target.coordinates:
         met |= closure_of(target, forward(robot, result)).max(axis=1) <= tolerance
