@@ -112,3 +112,16 @@ def test_slerp_of_batches():
     s = np.array([0.1, 0.5, 0.7, 1.0])
     each = [slerp(a, b, fraction) for a, b, fraction in zip(start, end, s, strict=True)]
     np.testing.assert_allclose(slerp(start, end, s), each, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [1e-13, 1e-11, 1e-8])
+def test_an_axis_is_free_below_a_trillionth_and_is_read_above(angle):
+    read = axis_angle_from_matrix(exp(DIRECTIONS * angle))
+    assert (read.axis_free == (angle < 1e-12)).all()
+    np.testing.assert_allclose(read.axis, DIRECTIONS, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("wrong", [np.inf, np.nan])
+def test_an_axis_that_is_not_finite_is_refused(wrong):
+    with pytest.raises(InputError, match="finite vector"):
+        matrix_from_axis_angle([[1.0, 0.0, 0.0], [wrong, 0.0, 0.0]], 1.0)

@@ -93,3 +93,26 @@ def test_rpy_is_about_fixed_x_then_y_then_z():
 def test_other_sequences_are_refused(sequence):
     with pytest.raises(InputError, match="no sequence of Euler angles"):
         matrix_from_euler(sequence, [0, 0, 0])
+
+
+@pytest.mark.parametrize("sequence", SEQUENCES)
+@pytest.mark.parametrize(("off", "lock"), [(3e-8, True), (3e-7, False)])
+def test_a_lock_is_a_tenth_of_a_microradian_wide(sequence, off, lock):
+    middle = off if sequence[0] == sequence[2] else np.pi / 2 - off
+    assert bool(euler_from_matrix(sequence, matrix_from_euler(sequence, [0.4, middle, 1.1])).singular) == lock
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("sequence", ["xyz", "zyx", "zyz"])
+def test_no_turn_has_no_negative_zeros_and_half_turns_that_are_positive(sequence, frame):
+    for matrix in (
+        np.eye(3),
+        np.diag([1.0, -1.0, -1.0]),
+        np.diag([-1.0, 1.0, -1.0]),
+        np.diag([-1.0, -1.0, 1.0]),
+    ):
+        read = euler_from_matrix(sequence, matrix, frame)
+        for angles in (read.angles, read.alternative):
+            assert not np.signbit(angles[angles == 0.0]).any()
+    other = euler_from_matrix(sequence, np.eye(3), frame).alternative
+    assert other.tolist() == ([np.pi] * 3 if sequence != "zyz" else [np.pi, 0.0, np.pi])

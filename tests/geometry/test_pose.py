@@ -85,3 +85,31 @@ def test_what_is_no_pose_is_refused():
         check_pose(A[0, :3])
     with pytest.raises(InputError, match="mirrors space"):
         check_pose(np.diag([1, 1, -1, 1]))
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("column", range(4))
+def test_a_last_row_that_is_typed_is_exact_to_a_billionth(column, side):
+    pose = np.array(A[0])
+    pose[3, column] += side * 0.5e-9
+    assert check_pose(pose) < 1e-15
+    pose[3, column] += side * 1e-9
+    with pytest.raises(InputError, match="last row"):
+        check_pose(pose)
+
+
+@pytest.mark.parametrize("entry", [(0, 0), (1, 3), (3, 3)])
+def test_a_pose_is_finite_and_its_rotation_is_one(entry):
+    pose = np.array(A[0])
+    pose[entry] = np.nan
+    with pytest.raises(InputError, match="4x4 finite entries"):
+        check_pose(pose)
+
+
+def test_one_rotation_or_one_translation_serves_a_whole_batch():
+    rotation, translation = A[0, :3, :3], A[:, :3, 3]
+    for poses in (build(rotation, translation), build(A[:, :3, :3], A[0, :3, 3]), build(None, translation)):
+        assert poses.shape == A.shape
+        np.testing.assert_array_equal(poses[:, 3], np.tile([0.0, 0.0, 0.0, 1.0], (len(A), 1)))
+    np.testing.assert_array_equal(build(rotation, translation)[:, :3, 3], translation)
+    np.testing.assert_array_equal(build(rotation, translation)[1, :3, :3], rotation)

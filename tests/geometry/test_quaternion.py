@@ -11,6 +11,7 @@ from trajcli.geometry.rotation import (
     matrix_from_quaternion,
     multiply,
     quaternion_from_matrix,
+    without_jumps,
 )
 
 RANDOM = Rotation.random(500, random_state=7)
@@ -63,3 +64,33 @@ def test_what_is_no_unit_quaternion_is_refused():
         check_quaternion([1, 0, 0])
     with pytest.raises(InputError, match="length zero"):
         matrix_from_quaternion([[1, 0, 0, 0], [0, 0, 0, 0]])
+    for wrong in ([np.inf, 0, 0, 0], [np.nan, 0, 0, 1]):
+        with pytest.raises(InputError, match="not finite"):
+            matrix_from_quaternion([[1, 0, 0, 0], wrong])
+        with pytest.raises(InputError, match="four finite"):
+            check_quaternion(wrong)
+    with pytest.raises(InputError) as none:
+        check_quaternion([0, 0, 0, 0])
+    assert none.value.problems[0].hint == "no rotation is (1, 0, 0, 0)"
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_length_within_a_ten_thousandth_of_1_is_taken_and_told(side):
+    assert check_quaternion([0, 0, 1 + side * 0.9e-4, 0]) == pytest.approx(0.9e-4, rel=1e-9)
+    with pytest.raises(InputError, match="instead of 1"):
+        check_quaternion([0, 0, 1 + side * 1.1e-4, 0])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_signs_go_on_from_the_one_before_and_every_one_is_on_the_side_of_its_neighbour(side):
+    turn = np.linspace(0.0, 9.0, 40)[:, None]
+    smooth = np.cos(turn) * WXYZ[0] + np.sin(turn) * [-WXYZ[0, 1], WXYZ[0, 0], -WXYZ[0, 3], WXYZ[0, 2]]
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], (40, 1))
+    np.testing.assert_array_equal(without_jumps(signs * smooth, side * smooth[0]), side * smooth)
+
+
+@pytest.mark.parametrize(("w", "turned"), [(-1e-13, False), (1e-13, False), (-1e-9, True), (1e-9, False)])
+def test_a_half_turn_that_rounding_decides_has_the_sign_of_its_axis(w, turned):
+    """Components up to 1e-12 are taken as zero where the first sign is chosen."""
+    given = np.array([[w, 0.6, 0.8, 0.0]])
+    np.testing.assert_array_equal(without_jumps(given, None), -given if turned else given)

@@ -24,6 +24,19 @@ def test_quarter_turns_are_exact():
     np.testing.assert_array_equal(cosine, [(1, 0, -1, 0)[k % 4] for k in turns])
     np.testing.assert_array_equal(sine, [(0, 1, 0, -1)[k % 4] for k in turns])
     assert not np.signbit(cosine[cosine == 0]).any()
+    assert not np.signbit(sine[sine == 0]).any()
+
+
+@pytest.mark.parametrize("turns", [0, 1, -1, 100, -101])
+def test_a_quarter_turn_is_recognised_within_four_roundings_of_its_angle_or_of_1(turns):
+    angle = turns * np.pi / 2
+    rounding = np.finfo(np.float64).eps * max(1.0, abs(angle))
+    for share in (-3.0, 3.0):
+        assert {abs(float(entry)) for entry in cos_sin(angle + share * rounding)} == {0.0, 1.0}
+    for share in (-9.0, 9.0):
+        other = angle + share * rounding
+        assert cos_sin(other) == (np.cos(other), np.sin(other))
+        assert 0.0 not in cos_sin(other)
 
 
 @pytest.mark.parametrize("off", [1e-9, 1e-12, 3e-15])
@@ -94,3 +107,22 @@ def test_the_nearest_rotation_is_the_polar_factor():
     np.testing.assert_allclose(nearest, [polar(matrix)[0] for matrix in noisy], rtol=0, atol=1e-14)
     assert rotation_defect(nearest).max() < 1e-14
     np.testing.assert_allclose(np.linalg.det(nearest_rotation(np.diag([1.0, 1.0, -0.5]))), 1)
+
+
+def test_defects_count_in_every_column_and_either_way():
+    long, short = np.diag([1.0, 1.1, 1.0]), np.diag([0.9, 1.0, 1.0])
+    np.testing.assert_allclose(
+        rotation_defect(np.stack([long, short, np.eye(3)])), [0.21, 0.19, 0.0], atol=1e-15
+    )
+    with pytest.raises(InputError, match=r"column 2 has length 1\.1 instead of 1"):
+        check_rotation(long)
+    with pytest.raises(InputError, match="no rotation"):  # products of columns that no number holds
+        check_rotation([[1e200, -1e200, 0.0], [1e200, 1e200, 0.0], [0.0, 0.0, 1.0]])
+
+
+def test_a_mirrored_matrix_has_the_nearest_rotation_too():
+    """The rotation that aligns the axes best with the columns: those with the smallest stretch are turned over."""
+    mirrored = RANDOM[:20] @ np.diag([1.2, 0.3, -0.6]) @ RANDOM[20:40]
+    for matrix, nearest in zip(mirrored, nearest_rotation(mirrored), strict=True):
+        wanted = Rotation.align_vectors(matrix.T, np.eye(3))[0].as_matrix()
+        np.testing.assert_allclose(nearest, wanted, rtol=0, atol=1e-12)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from inverse_arms import arm, random_joints
 from oracle_robots import load, robot_of, robots
+from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.kinematics.forward import forward
@@ -133,3 +134,20 @@ def test_counts_equal_an_independent_closed_form(entry):
     robot = robot_of(next(robot for robot in robots() if robot["id"] == entry["robot"]))
     found = solve(robot, forward(robot, np.array(entry["joints"])))
     assert found.count.tolist() == entry["counts"]
+
+
+@pytest.mark.parametrize("name", ["UR", "wrist over elbow", "elbow, pitch and roll"])
+def test_all_poses_out_of_reach_say_exactly_how_far_each_branch_stays_away(name):
+    """Angles in rad, where those of poses within reach are only bounded; poses within reach between them."""
+    rng = np.random.default_rng(6)
+    robot = arm(name, rng)
+    poses = forward(robot, random_joints(robot, rng, 5))
+    poses[[0, 2, 4], :3, 3] += 2.0 * poses[[0, 2, 4], :3, 3]
+    poses[[0, 2, 4], :3, :3] = Rotation.random(3, rng=rng).as_matrix()
+    found = solve(robot, poses)
+    assert found.valid.any(axis=1).tolist() == [False, True, False, True, False]
+    there = forward(robot, found.joints[[0, 2, 4]])
+    away = np.linalg.norm(there[..., :3, 3] - poses[[0, 2, 4], None, :3, 3], axis=-1)
+    rest = np.swapaxes(there[..., :3, :3], -1, -2) @ poses[[0, 2, 4], None, :3, :3]
+    angles = Rotation.from_matrix(rest.reshape(-1, 3, 3)).magnitude().reshape(away.shape)
+    np.testing.assert_allclose(found.closure[[0, 2, 4]], np.stack([away, angles], axis=-1), rtol=0, atol=1e-7)
