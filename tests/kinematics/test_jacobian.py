@@ -7,7 +7,7 @@ import pytest
 from trajcli.errors import InputError
 from trajcli.geometry.rotation import log
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd, tcp_acceleration, tcp_twist
+from trajcli.kinematics.jacobian import jacobian, jacobian_dot_qd, linearisation, tcp_acceleration, tcp_twist
 
 CASES = [case for case in oracle.load("forward.yaml", "cases") if case["kind"] == "jacobian"]
 ARMS = pytest.mark.parametrize("arm", oracle.robots(), ids=lambda arm: arm["id"])
@@ -142,3 +142,31 @@ def test_rates_that_do_not_fit_are_refused():
         tcp_twist(robot, np.zeros(6), [0, 0])
     with pytest.raises(InputError, match="shape"):
         jacobian_dot_qd(robot, np.zeros((2, 6)), np.zeros(6))
+
+
+@pytest.mark.parametrize(
+    "robot", RANDOM_ARMS[4:8], ids=lambda robot: f"{len(robot.joints)}-{robot.convention}"
+)
+def test_one_pass_along_the_chain_gives_the_pose_and_its_derivatives(robot):
+    """With a base, a tool, turns and slides, of more configurations than are computed at a time."""
+    q = np.random.default_rng(12).uniform(-3, 3, (3, 2, len(robot.joints)))
+    many = np.tile(q.reshape(6, -1), (700, 1))
+    for values in (q, many):
+        poses, slopes = linearisation(robot, values)
+        np.testing.assert_allclose(poses, forward(robot, values), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(slopes, jacobian(robot, values), rtol=0, atol=1e-15)
+    for row in (0, 4190):
+        np.testing.assert_allclose(slopes[row], differences(robot, many[row]), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("frame", ["world", "base", "tcp"])
+def test_twists_and_accelerations_are_those_in_world_written_in_other_axes(frame):
+    robot = RANDOM_ARMS[6]
+    q, qd, qdd = np.random.default_rng(13).uniform(-2, 2, (3, len(robot.joints)))
+    rotation = {"world": np.eye(3), "base": robot.base[:3, :3].T, "tcp": forward(robot, q)[:3, :3].T}[frame]
+    for function, rates in ((tcp_twist, (qd,)), (tcp_acceleration, (qd, qdd))):
+        world = function(robot, q, *rates)
+        wanted = both_frames(rotation, world[:, None])[:, 0]
+        np.testing.assert_allclose(function(robot, q, *rates, frame), wanted, rtol=0, atol=1e-11)
+    twist = both_frames(rotation, differences(robot, q)) @ qd
+    np.testing.assert_allclose(tcp_twist(robot, q, qd, frame), twist, rtol=0, atol=1e-7)
