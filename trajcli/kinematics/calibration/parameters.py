@@ -127,13 +127,13 @@ def _parameters_of(robot: Robot, word: str) -> tuple[ArmParameter, ...]:
         return (ArmParameter(owner, name, names.index(owner)),)
     if owner in _FRAMES and name in POSE:
         return (ArmParameter(owner, name),)
-    known = ["all", "dh", *_FRAMES, *names]
-    known += [f"{each}.{key}" for each in names for key in ROW]
-    known += [f"{each}.{key}" for each in _FRAMES for key in POSE]
+    words = ["all", "dh", *_FRAMES, *names]
+    words += [f"{each}.{key}" for each in names for key in ROW]
+    words += [f"{each}.{key}" for each in _FRAMES for key in POSE]
     forms = "all, dh, base, tool, a joint, or such as " + f"{names[0]}.theta and base.x"
     raise InputError(
         f"--free: {robot.name} has no parameter '{word}'",
-        hint=did_you_mean(word, known) or f"expected {forms}",
+        hint=did_you_mean(word, words) or f"expected {forms}",
     )
 
 

@@ -65,8 +65,8 @@ def by_name(answers: Answers, name_of: NDArray[np.intp], names: Sequence[Branch]
     columns, taken = [], []
     for index in range(len(names)):
         mine = name_of == index
-        most = max(1, int(np.count_nonzero(mine, axis=0).max(initial=0)))
-        order = np.argsort(~mine, axis=0, kind="stable")[:most]
+        count = max(1, int(np.count_nonzero(mine, axis=0).max(initial=0)))
+        order = np.argsort(~mine, axis=0, kind="stable")[:count]
         taken.append((order, np.take_along_axis(mine, order, axis=0)))
         columns += [index] * len(order)
     order = np.concatenate([some for some, _ in taken])

@@ -249,11 +249,11 @@ def _insert(
     rows, values = solutions
     gap = joints[rows] - values[:, None]
     gap = np.abs(np.where(revolute(robot), gap - FULL * np.round(gap / FULL), gap)).max(axis=-1)
-    known = (valid[rows] & (gap <= SAME)).any(axis=1)
+    repeated = (valid[rows] & (gap <= SAME)).any(axis=1)
     fixed = valid[rows] & ~singular[rows]
     cost = np.where(fixed, np.inf, gap + np.where(valid[rows], _TAKEN, 0.0))
     branch = np.argmin(cost, axis=1)
-    new = ~known & ~fixed.all(axis=1)
+    new = ~repeated & ~fixed.all(axis=1)
     joints[rows[new], branch[new]] = values[new]
     valid[rows[new], branch[new]] = True
     return bool(new.any())

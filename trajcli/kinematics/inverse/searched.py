@@ -83,11 +83,11 @@ def by_held_joint(
 
 
 def _with_rows(answers: Answers, rows: NDArray[np.intp], others: Answers) -> Answers:
-    most = max(answers.valid.shape[0], others.valid.shape[0])
+    branches = max(answers.valid.shape[0], others.valid.shape[0])
     arrays = []
     for name in ("joints", "closure", "valid"):
         own, other = (getattr(some, name) for some in (answers, others))
-        own, other = (_filled(array, most) for array in (own, other))
+        own, other = (_filled(array, branches) for array in (own, other))
         own[..., rows] = other
         arrays.append(own)
     return replace(answers, joints=arrays[0], closure=arrays[1], valid=arrays[2])
@@ -199,10 +199,10 @@ def _self_motions_of(
     rows, branches = np.nonzero(valid)
     if not len(rows):
         return singular, free
-    known = self_motions(robot, target.rows(rows), joints[rows, branches], freedom)
-    singular[rows, branches], free[rows, branches] = known.singular, known.free
-    if near is not None and not freedom and known.singular.any():
-        rows, branches = rows[known.singular], branches[known.singular]
+    motions = self_motions(robot, target.rows(rows), joints[rows, branches], freedom)
+    singular[rows, branches], free[rows, branches] = motions.singular, motions.free
+    if near is not None and not freedom and motions.singular.any():
+        rows, branches = rows[motions.singular], branches[motions.singular]
         joints[rows, branches] = nearest_on_self_motions(
             robot, target.rows(rows), joints[rows, branches], near[rows]
         )

@@ -53,8 +53,8 @@ def method_for(robot: Robot) -> IkMethod:
     arm = axis_geometry(robot)
     if any(joint.beta for joint in robot.joints):
         return numeric_method(arm)
-    for name, most in FAMILIES.items():
-        if len(robot.joints) > most:
+    for name, largest in FAMILIES.items():
+        if len(robot.joints) > largest:
             continue
         method: IkMethod | None = import_module(f"{__package__}.{name}").match(arm)
         if method is not None and _every_joint_counts(robot, method):
