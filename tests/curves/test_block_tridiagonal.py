@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from counted_calls import calls_of
 
-from trajcli.curves.linear_systems import cyclic_factors, solve_block_tridiagonal
+from trajcli.curves.linear_systems import block_factors, cyclic_factors, solve_block_tridiagonal
 
 
 def system(seed, blocks, size):
@@ -35,6 +35,21 @@ def test_as_dense(blocks, size):
         np.testing.assert_allclose(found, np.linalg.solve(dense, again), rtol=1e-9, atol=1e-9)
     for kept, given in zip(before, (diagonal, right), strict=True):
         np.testing.assert_array_equal(kept, given)
+
+
+@pytest.mark.parametrize("blocks", [1, 2, 3, 4, 5, 8, 21])
+def test_pairs_of_unknowns_in_sizes_that_differ_much_are_solved_to_rounding(blocks):
+    """Rows and columns are scaled by up to 1e8: what elimination loses there comes back from the residual."""
+    diagonal, right, dense = system(blocks, blocks, 2)
+    scales = 10.0 ** np.random.default_rng(blocks).uniform(-4, 4, (blocks, 2))
+    diagonal = diagonal * scales[:, :, None] * scales[:, None]
+    right = right * scales[:-1, :, None] * scales[1:, None]
+    dense = dense * scales.reshape(-1, 1) * scales.reshape(-1)
+    factors, values = block_factors(diagonal, right), np.random.default_rng(2).normal(size=(2, blocks, 2))
+    for each in values * scales:
+        x = factors.solve(each).reshape(-1)
+        size = np.abs(dense) @ np.abs(x) + np.abs(each.reshape(-1))
+        assert (np.abs(dense @ x - each.reshape(-1)) <= 4e-14 * size).all()
 
 
 def test_missing_values_are_zero():

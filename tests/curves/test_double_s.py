@@ -14,7 +14,11 @@ CASES = {
     "no constant acceleration": (3.0, 0.3, 2.0, 8.0),
     "jerk alone": (0.05, 1.0, 2.0, 8.0),
     "long": (1000.0, 1.0, 2.0, 8.0),
+    "hardly without constant acceleration": (0.19, 1.0, 2.0, 8.0),
+    "jerk that hardly counts": (3.0, 1.0, 2.0, 1e9),
 }
+
+IDS = {case: name for name, case in CASES.items()}
 
 
 def followed(profile: DoubleS, jerk: float) -> tuple[np.ndarray, np.ndarray]:
@@ -67,7 +71,8 @@ def test_a_slower_profile_lasts_as_given_within_the_same_bounds(
 @pytest.mark.parametrize("case", [(0.05, 1.0, 2.0, 8.0), (0.6, 1.0, 2.0, 8.0)])
 def test_no_profile_lasts_shorter_than_the_fastest(case: tuple[float, ...]) -> None:
     distance, _, acceleration, jerk = case
-    assert double_s_of(distance, 0.999 * ruckig_duration(case), acceleration, jerk) is None
+    for part in (0.999, 0.9, 0.5, 0.1, 1e-3):
+        assert double_s_of(distance, part * ruckig_duration(case), acceleration, jerk) is None
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e6, 1e10])
@@ -90,6 +95,13 @@ def test_no_profile_passes_its_acceleration_where_rounding_takes_the_constant_on
         for duration in (np.nextafter(fastest, 0), fastest, fastest * (1 + 1e-15), fastest * (1 + 1e-12)):
             profile = double_s_of(distance, duration, acceleration, jerk)
             assert profile is None or followed(profile, jerk)[1][2] <= acceleration * (1 + 1e-11)
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_phases_are_those_that_last(case: tuple[float, ...]) -> None:
+    times, jerks = fastest_double_s(*case).phases(case[-1])
+    assert min(times) > 0
+    assert len(jerks) == {"jerk alone": 3, "no constant acceleration": 5}.get(IDS[case], len(times))
 
 
 def test_a_negative_jerk_moves_backwards() -> None:

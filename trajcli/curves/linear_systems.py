@@ -68,9 +68,9 @@ def solve_block_tridiagonal(diagonal: Array, right: Array, values: Array) -> Arr
         values: Shape (m,), m <= b k; what is missing is zero.
     """
     blocks, size = diagonal.shape[:2]
-    known = np.zeros(blocks * size)
-    known[: values.size] = values
-    return cyclic_factors(diagonal, right).solve(known.reshape(blocks, size)).reshape(-1)[: values.size]
+    padded = np.zeros(blocks * size)
+    padded[: values.size] = values
+    return cyclic_factors(diagonal, right).solve(padded.reshape(blocks, size)).reshape(-1)[: values.size]
 
 
 def _cyclic_reduction(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
@@ -84,15 +84,15 @@ def _cyclic_reduction(lower: Array, diagonal: Array, upper: Array, right: Array)
     odd_lower, odd_upper = lower[1::2] / diagonal[1::2], upper[1::2] / diagonal[1::2]
     odd_right = right[:, 1::2] / diagonal[1::2]
     after, before = upper[0 : 2 * pairs : 2], lower[2::2]
-    kept, rest = diagonal[0::2].copy(), right[:, 0::2].copy()
+    kept, others = diagonal[0::2].copy(), right[:, 0::2].copy()
     kept[:pairs] -= after * odd_lower
     kept[1:] -= before * odd_upper[:links]
-    rest[:, :pairs] -= after * odd_right
-    rest[:, 1:] -= before * odd_right[:, :links]
+    others[:, :pairs] -= after * odd_right
+    others[:, 1:] -= before * odd_right[:, :links]
     beyond, back = np.zeros(kept.size), np.zeros(kept.size)
     beyond[:links] = -after[:links] * odd_upper[:links]
     back[1:] = -before * odd_lower[:links]
-    even = _cyclic_reduction(back, kept, beyond, rest)
+    even = _cyclic_reduction(back, kept, beyond, others)
     solution = np.empty_like(right)
     solution[:, 0::2] = even
     odd_right -= odd_lower * even[:, :pairs]
@@ -157,11 +157,11 @@ class CyclicFactors:
 
     Attributes:
         levels: From the finest on.
-        rest: Inverse of the last block, shape (1, k, k).
+        last: Inverse of the last block, shape (1, k, k).
     """
 
     levels: tuple[_Level, ...]
-    rest: Array
+    last: Array
 
     def solve(self, values: Array) -> Array:
         """Return x, shape (b, k), with A x = values, shape (b, k)."""
@@ -170,7 +170,7 @@ class CyclicFactors:
     def _solved(self, right: Array, depth: int) -> Array:
         """Return the solution (b, k, 1) from one level on."""
         if depth == len(self.levels):
-            return np.asarray(self.rest @ right)
+            return np.asarray(self.last @ right)
         level = self.levels[depth]
         count, links = len(level.before), len(level.after)
         odd, even = right[1::2], right[0::2].copy()

@@ -56,11 +56,11 @@ def _taylor_coefficient(power: int) -> Array:
 def _sine(step: int) -> float:
     """Return sin(2 pi step / pieces) from the first eighth turn, so that equal values have equal bits."""
     quarter = _PIECES // 4
-    turn, rest = divmod(step % _PIECES, quarter)
+    turn, part = divmod(step % _PIECES, quarter)
     if turn % 2:
-        rest = quarter - rest
+        part = quarter - part
     angle = 2 * math.pi / _PIECES
-    size = math.sin(rest * angle) if 2 * rest <= quarter else math.cos((quarter - rest) * angle)
+    size = math.sin(part * angle) if 2 * part <= quarter else math.cos((quarter - part) * angle)
     return -size if turn >= 2 else size
 
 
@@ -97,10 +97,10 @@ def fastest_double_s(distance: float, velocity: float, acceleration: float, jerk
 def double_s_of(distance: float, duration: float, acceleration: float, jerk: float) -> DoubleS | None:
     """Return the profile that lasts `duration` and has the least velocity; None where none lasts so short."""
     full = acceleration / jerk
-    rest = duration - full
-    square = rest * rest - 4 * distance / acceleration
-    if rest > 0 and square >= 0:
-        velocity = 2 * distance / (rest + math.sqrt(square))
+    left = duration - full
+    square = left * left - 4 * distance / acceleration
+    if left > 0 and square >= 0:
+        velocity = 2 * distance / (left + math.sqrt(square))
         if velocity >= acceleration * full:
             t_a = velocity / acceleration - full
             return _lasting(duration, full, t_a)

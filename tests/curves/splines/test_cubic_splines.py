@@ -124,6 +124,23 @@ def test_ten_thousand_points(ratio, values, rows, monkeypatch):
             assert_through(curve, times, positions, 2)
 
 
+def test_components_that_are_solved_in_parts_keep_their_own_ends(monkeypatch):
+    """Also where not even one component is within what is solved together."""
+    rng = np.random.default_rng(8)
+    times, positions = uneven_times(rng, 9, 10.0), rng.normal(size=(9, 5))
+    ends, rates = rng.normal(size=(2, 2, 5))
+    t = np.linspace(times[0], times[-1], 100)
+    expected = CubicSpline(times, positions, bc_type=tuple((1, end) for end in ends))
+    whole = continuous_acceleration(times, positions, ends, rates)
+    for values in (20, 5):
+        monkeypatch.setattr("trajcli.curves.splines.cubic._VALUES", values)
+        np.testing.assert_allclose(clamped(times, positions, *ends).evaluate(t), expected(t), atol=1e-12)
+        part = continuous_acceleration(times, positions, ends, rates)
+        np.testing.assert_array_equal(part.coefficients, whole.coefficients)
+        for order, wanted in ((1, ends), (2, rates)):
+            np.testing.assert_allclose(part.evaluate(times[[0, -1]], order, side="left"), wanted, atol=1e-11)
+
+
 def test_slow_changes_of_a_fast_motion_stay_continuous():
     """At a constant velocity with hardly any acceleration, rounding of velocities must not become jumps."""
     rng = np.random.default_rng(9)
@@ -203,10 +220,11 @@ def test_memory_grows_with_the_points_and_not_faster():
     ("times", "positions", "said"),
     [
         ([0.0, 1.0, 1.0], np.zeros((3, 1)), "waypoint 2 is at 1.0, waypoint 1 before it at 1.0"),
-        ([0.0, 2.0, 1.0], np.zeros((3, 1)), "waypoint 2 is at 1.0, waypoint 1 before it at 2.0"),
+        ([0.0, 2.0, 1.0, 0.5], np.zeros((4, 1)), "waypoint 2 is at 1.0, waypoint 1 before it at 2.0"),
         ([0.0], np.zeros((1, 1)), "at least 2 points"),
         ([0.0, 1.0], np.zeros(2), "do not fit"),
         ([0.0, 1.0], np.zeros((3, 1)), "do not fit"),
+        ([[0.0], [1.0]], np.zeros((2, 1)), "do not fit"),
         ([0.0, np.nan], np.zeros((2, 1)), "finite"),
         ([0.0, 1.0], [[0.0], [np.inf]], "finite"),
     ],

@@ -102,6 +102,8 @@ def test_a_change_that_is_rounding_is_flat():
     assert positions[1] != positions[2]
     for rule in (computed_velocities, parabola_velocities):
         np.testing.assert_array_equal(rule(times, positions, [0.0], [0.0]), 0.0)
+        slow = rule(times, np.array([[1.0], [1.0 + 2**-47], [1.0 + 2**-46], [1.0]]), [0.0], [0.0])
+        np.testing.assert_array_equal(slow[:, 0], [0, 2**-47, 0, 0])
     tiny = np.array([[0.0], [1e-300], [2e-300]])
     assert computed_velocities(times[:3], tiny, [0.0], [0.0])[1, 0] == 1e-300
 
@@ -115,6 +117,14 @@ def test_a_parabola_gives_its_own_velocities(seed):
     got = parabola_velocities(times, positions, [0.0], [0.0])
     np.testing.assert_allclose(got[1:-1, 0], 1 + 0.02 * times[1:-1], rtol=1e-12)
     np.testing.assert_allclose(parabola_velocities(times, -positions, [0.0], [0.0]), -got, rtol=1e-15)
+
+
+def test_accelerations_follow_from_velocities_by_the_same_rule_and_each_end_keeps_its_own():
+    times = np.array([0.0, 1.0, 3.0, 4.0])
+    velocities = np.array([[0.0, 1.0], [1.0, 1.0], [5.0, 0.0], [4.0, -2.0]])
+    got = computed_accelerations(times, velocities, [7.0, 8.0], [9.0, 10.0])
+    # slopes 1 then 2, of which the shorter interval weighs more; then a turn
+    np.testing.assert_allclose(got, [[7, 8], [4 / 3, 0], [0, -1.5], [9, 10]], rtol=1e-15)
 
 
 @settings(max_examples=60, deadline=None)

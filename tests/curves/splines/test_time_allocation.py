@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 from scipy.optimize import minimize
 from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.splines.time_allocation import fastest_durations
+from trajcli.curves.splines.time_allocation import DensePoints, fastest_durations
 
 FREE = (-np.inf, np.inf)
 
@@ -119,6 +119,28 @@ def test_the_limits_are_kept_and_one_is_reached():
     assert max(used) > 1 - 1e-6
 
 
+def test_a_joint_without_a_bound_frees_no_other():
+    q = np.array([[0.0, 0.0], [3.0, 1.0], [0.0, 2.0]])
+    limits = bounds(velocity=1e3, joints=2)
+    limits[1, 1] = -6.0, 6.0
+    np.testing.assert_allclose(fastest_durations(resting(q), np.ones(2), limits), [1, 1], rtol=0.02)
+
+
+def test_the_search_begins_with_the_best_guess_where_few_pieces_are_too_fast(monkeypatch):
+    """What is found without any step of Newton: the stretched guess, or another one that is slowed where it needs it."""
+    monkeypatch.setattr("trajcli.curves.splines.time_allocation._centred", lambda _, point, *_others: point)
+    steps = np.ones(60)
+    steps[30] = 4.0
+    q, limits = np.append(0.0, np.cumsum(steps))[:, None], bounds(velocity=1.0)
+    even = np.ones(60)
+    assert fastest_durations(straight(q), even, limits).sum() == pytest.approx(240)
+    assert fastest_durations(straight(q), even, limits, [steps]).sum() == pytest.approx(63)
+    assert fastest_durations(straight(q), steps, limits, [even]).sum() == pytest.approx(63)
+    eased = fastest_durations(straight(q), even, limits, [even])
+    assert 63 < eased.sum() < 100
+    assert (eased >= steps).all()
+
+
 def test_no_durations_at_all():
     """A velocity that is given at an end and above its limit stays so however long the pieces last."""
 
@@ -144,3 +166,42 @@ def test_a_curve_may_end_before_the_durations_do():
 
     found = fastest_durations(family, np.array([50.0, 1.0, 1.0]), limits)
     assert np.minimum(found, 1.0) == pytest.approx(0.5, rel=1e-3)
+
+
+def law_of(times, values, slopes):
+    """Return scipy's law through values at times: its ends free, or of given slope and without acceleration."""
+    if slopes is None:
+        return CubicSpline(times, values)
+    knots = [*[times[0]] * 4, (times[0] + times[1]) / 2, *times[1:-1], (times[-2] + times[-1]) / 2]
+    ends = tuple([(1, slope), (2, 0.0)] for slope in slopes)
+    return make_interp_spline(times, values, k=3, t=[*knots, *[times[-1]] * 4], bc_type=ends)
+
+
+@pytest.mark.parametrize("slopes", [None, (0.0, 0.0), (1.5, 0.7)])
+def test_dense_points_are_passed_when_a_law_through_some_of_them_says(slopes, monkeypatch):
+    """First 24 durations, then three times as many, which begin with the shortest that were found."""
+    begun = []
+    u = np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 217))
+
+    def found(family, coarse, _bounds, longer):
+        begun.append(coarse)
+        chosen = np.round(np.linspace(0, 216, coarse.size + 1)).astype(int)
+        fine = family(coarse * longer[len(begun) - 1])
+        ends = times_of(coarse * longer[len(begun) - 1])
+        np.testing.assert_allclose(times_of(fine)[chosen], ends, rtol=1e-9)
+        np.testing.assert_allclose(law_of(ends, u[chosen], slopes)(times_of(fine)), u, rtol=1e-9)
+        return coarse * longer[len(begun) - 1]
+
+    dense = DensePoints(lambda h: h, u, bounds(), *([slopes] if slopes != (0.0, 0.0) else []))
+    for longer, least in (([1.0, 1.01], 1.0), ([1.01, 0.999], 1.01 * 0.999)):
+        begun.clear()
+        monkeypatch.setattr(
+            "trajcli.curves.splines.time_allocation.fastest_durations",
+            lambda *given, longer=longer: found(*given, longer),
+        )
+        durations = dense.durations(np.diff(u))
+        assert [one.size for one in begun] == [24, 72]
+        np.testing.assert_allclose([one.sum() for one in begun], np.ptp(u) * np.array([1, longer[0]]))
+        assert durations.sum() == pytest.approx(np.ptp(u) * least)
+    monkeypatch.setattr("trajcli.curves.splines.time_allocation.fastest_durations", lambda *_: None)
+    assert dense.durations(np.diff(u)) is None

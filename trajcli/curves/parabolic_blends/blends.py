@@ -115,7 +115,7 @@ def blended(
     asked = np.broadcast_to(np.asarray(durations, dtype=np.float64), (spec.times.size,))[:, None]
     if not (np.isfinite(asked) & (asked >= 0)).all():
         raise ValueError(f"blend durations must be finite and not negative, got {asked.min():.9g} s")
-    used = scaled_to_fit(asked, np.diff(spec.times)[:, None], *spec.room())
+    used = scaled_to_fit(asked, np.diff(spec.times)[:, None], *spec.blend_room())
     knots = corners(spec, OFFSET * used, used[spec.points])
     _refuse_jumps(knots)
     shrunk = tuple(

@@ -104,22 +104,22 @@ class CornerSpec:
         through[1:-1] = np.where(v[:-1] * v[1:] > 0, slower, 0.0)
         return through
 
-    def room(self) -> tuple[Array, Array]:
+    def blend_room(self) -> tuple[Array, Array]:
         """Return how many times its blend each waypoint takes after and before it, each of shape (m, 1).
 
         One to be passed exactly takes 5/8 of its blend up to its corner and half of it beyond.
         """
-        return self._room(self.times.size, OFFSET + 0.5 if self.exactly else 0.5)
+        return self._room_of(self.times.size, OFFSET + 0.5 if self.exactly else 0.5)
 
     def corner_room(self) -> tuple[Array, Array]:
         """Return how many times its blend each corner takes after and before it, each of shape (M, 1)."""
-        return self._room(self.points.size, 0.5)
+        return self._room_of(self.points.size, 0.5)
 
-    def _room(self, count: int, inner: float) -> tuple[Array, Array]:
+    def _room_of(self, count: int, inner: float) -> tuple[Array, Array]:
         """Return room (count, 1) after and before, with that of inner blends given."""
-        room = np.full((count, 1), inner)
-        room[[0, -1]] = 1.0 if self.ends == "inside" else 0.5
-        return room, room
+        taken = np.full((count, 1), inner)
+        taken[[0, -1]] = 1.0 if self.ends == "inside" else 0.5
+        return taken, taken
 
 
 def corners(spec: CornerSpec, offsets: Array, blends: Array) -> RoundedPolyline:

@@ -148,7 +148,7 @@ def _offsets(spec: CornerSpec, a: Array) -> Array:
     for _ in range(_ROUNDS):
         asked = _asked(spec, _sharp(spec, offsets), a)
         wanted = np.concatenate([asked[:1], np.maximum(asked[1:-1:2], asked[2:-1:2]), asked[-1:]])
-        fitting = OFFSET * scaled_to_fit(wanted, segments, *spec.room())
+        fitting = OFFSET * scaled_to_fit(wanted, segments, *spec.blend_room())
         fitting[[0, -1]] = 0.0
         settled = (np.abs(fitting - offsets) <= _SETTLED * near).all()
         offsets = fitting

@@ -88,8 +88,8 @@ def _check(slope: Array, velocity: Array, other: Array, end: Literal["first", "l
     for component, (mean, own, opposite) in enumerate(
         zip(slope.tolist(), velocity.tolist(), other.tolist(), strict=True)
     ):
-        most = mean * _largest_ratio(opposite / mean) if mean else 0.0
-        low, high = min(most, 0.0), max(most, 0.0)
+        bound = mean * _largest_ratio(opposite / mean) if mean else 0.0
+        low, high = min(bound, 0.0), max(bound, 0.0)
         if not low <= own <= high:
             raise ShapeError(component, end, own, low, high)
 

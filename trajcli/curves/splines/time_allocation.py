@@ -334,5 +334,5 @@ class DensePoints:
         if self.slopes is None:
             return not_a_knot(times, values[:, None])
         first, last = (np.array([slope]) for slope in self.slopes)
-        rest = np.zeros(1)
-        return continuous_acceleration(times, values[:, None], (first, last), (rest, rest), None)
+        still = np.zeros(1)
+        return continuous_acceleration(times, values[:, None], (first, last), (still, still), None)

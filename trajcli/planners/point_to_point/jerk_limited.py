@@ -209,8 +209,8 @@ def _with_braking(planned: Planned, request: Request, boundaries: Sequence[Bound
 
 def _orders_outside(boundary: BoundaryProblem) -> list[int]:
     """Return the derivatives, 1 and 2, whose bounds the start breaks, or cannot help to break."""
-    known = braking(*boundary.initial[1:], boundary.bounds)
-    return [order for order, time in ((1, known.velocity), (2, known.acceleration)) if time > 0]
+    brakes = braking(*boundary.initial[1:], boundary.bounds)
+    return [order for order, time in ((1, brakes.velocity), (2, brakes.acceleration)) if time > 0]
 
 
 def _braking_event(planned: Planned, boundary: BoundaryProblem, joint: int, order: int) -> Event:

@@ -119,10 +119,10 @@ class Trapezoid(PointToPoint):
         size = np.abs(displacement[moving])
         bounds = [float((each[moving] / size).min()) for each in (speed, np.minimum(faster, slower))]
         laws = PhasesInPeriods(period, smooth=False)
-        known = laws.common([1.0], [bounds], max(least, self.duration or 0.0))
-        if known is None:
+        found = laws.common([1.0], [bounds], max(least, self.duration or 0.0))
+        if found is None:
             return None
-        count, ((_, ramp, cruise),) = known
+        count, ((_, ramp, cruise),) = found
         top = 1.0 / (period * (count - ramp))
         knots = ((ramp * period, top), (cruise * period, top), (ramp * period, 0.0))
         profile = VelocityProfile(0.0, tuple(knot for knot in knots if knot[0] > 0))

@@ -150,13 +150,13 @@ def jerk_limited_in_periods(
     bounds = rates_forward(displacement, robot)[moving]
     if not moving.size or not np.isfinite(bounds[:, :2]).all():
         return None
-    smooth, sizes = bool(np.isfinite(bounds[:, 2]).all()), np.abs(displacement[moving])
+    smooth, sizes = bool(np.isfinite(bounds[:, 2]).any()), np.abs(displacement[moving])
     distances = [1.0] if on_line else sizes.tolist()
     each = [(bounds / sizes[:, None]).min(axis=0)] if on_line else [*bounds]
-    known = PhasesInPeriods(period, smooth=smooth).common(distances, each, least)
-    if known is None:
+    found = PhasesInPeriods(period, smooth=smooth).common(distances, each, least)
+    if found is None:
         return None
-    count, lengths = known
+    count, lengths = found
     if on_line:
         profile = profile_in_periods(0.0, 1.0, lengths[0], period, smooth=smooth)
         law = profile.curve()
