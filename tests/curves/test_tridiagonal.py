@@ -39,6 +39,13 @@ def test_rows_hold_to_rounding(seed, m):
         np.testing.assert_array_equal(values, before)
 
 
+@pytest.mark.parametrize(("seed", "m", "spread"), [(3, 400, 1e8), (7, 400, 1e12)])
+def test_rows_of_mixed_sizes_lose_no_digit_by_halving(seed, m, spread):
+    lower, diagonal, upper, right = dominant_system(np.random.default_rng(seed), m, spread=spread)
+    x, matrix = solve_tridiagonal(lower, diagonal, upper, right), dense(lower, diagonal, upper)
+    assert (np.abs(matrix @ x - right) <= 1e-15 * (np.abs(matrix) @ np.abs(x) + np.abs(right))).all()
+
+
 def test_exact_in_rational_numbers():
     rng = np.random.default_rng(5)
     lower, diagonal, upper, right = dominant_system(rng, 8, 1)
@@ -62,11 +69,12 @@ def test_columns_do_not_touch_each_other():
         np.testing.assert_array_equal(solve_tridiagonal(lower, diagonal, upper, right[:, [k]])[:, 0], x[:, k])
 
 
-@pytest.mark.parametrize("bad", [1.0, 0.0, -9.0])
-def test_a_row_that_is_not_dominated_is_refused(bad):
-    ones = np.ones(4)
+@pytest.mark.parametrize("bad", [2.0 * (1 - 1e-12), 1.0, 0.0, -9.0])
+@pytest.mark.parametrize("signs", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
+def test_a_row_that_is_not_dominated_is_refused(bad, signs):
+    lower, upper = np.outer(signs, np.ones(4))
     with pytest.raises(ValueError, match="row 2 of the system has diagonal"):
-        solve_tridiagonal(ones, np.array([3.0, 3.0, bad, 3.0]), ones, np.ones((4, 1)))
+        solve_tridiagonal(lower, np.array([3.0, 3.0, bad, 3.0]), upper, np.ones((4, 1)))
 
 
 def test_a_row_of_zeros_is_refused():

@@ -356,7 +356,7 @@ def _middle_of_duration(motion: _ThreePartMotion, duration: float) -> VelocityPr
             slack = _ROUNDING * cruise
             rise, fall = abs(cruise - initial) / up, abs(cruise - final) / down
             fits = first * (cruise - initial) >= -slack and second * (cruise - final) >= -slack
-            if cruise > 0 and fits and rise + fall <= duration * (1 + _ROUNDING):
+            if cruise >= 0 and fits and rise + fall <= duration * (1 + _ROUNDING):
                 return _three(initial, cruise, final, rise, fall, duration)
     return None
 

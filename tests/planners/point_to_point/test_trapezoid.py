@@ -13,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from random_jobs import loaded, only_move, plan_of
 
-from trajcli.errors import PlanningError
+from trajcli.errors import InputError, MissingLimitError, PlanningError
 
 
 def trapezoid(distance: float, start_velocity: float = 0.0, end_velocity: float = 0.0, **fields: Any) -> Any:
@@ -254,19 +254,147 @@ def test_unsynchronised_joints_arrive_by_themselves() -> None:
     assert (planned.curve.evaluate(np.linspace(0, planned.curve.end, 20))[:, 2] == 1).all()
 
 
-def test_a_joint_that_arrives_moving_cannot_wait() -> None:
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_joint_that_arrives_moving_cannot_wait(sign: int) -> None:
     job = {
         "version": 1,
         "robot": {"joints": 2},
         "limits": {"velocity": 1, "acceleration": 4},
         "start": {"joints": [0, 0]},
         "moves": [
-            {"planner": "trapezoid", "to": {"joints": [1, 3], "velocity": [0.5, 0]}, "synchronize": "none"}
+            {
+                "planner": "trapezoid",
+                "to": {"joints": [sign, 3], "velocity": [0.5 * sign, 0]},
+                "synchronize": "none",
+            }
         ],
     }
     planner, start, robot = only_move(job)
     with pytest.raises(PlanningError, match=r"j1 arrives .* cannot wait"):
         planner.plan(start, robot)
+
+
+def two_joints(target: Any, start: Any = (0.0, 0.0), limits: Any = None, **fields: Any) -> Any:
+    """Return planner, start and robot of a trapezoid from [0, 0] at the velocities `start`."""
+    return only_move(
+        {
+            "version": 1,
+            "robot": {"joints": 2},
+            "limits": limits or {},
+            "start": {"joints": [0, 0], "velocity": [*start]},
+            "moves": [{"planner": "trapezoid", "to": target, **fields}],
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("fields", "match"),
+    [
+        ({"velocity": [9, 3]}, "velocity of j2 must be above 4 rad/s and at most 8 rad/s, got 3 rad/s"),
+        (
+            {"velocity": [1.25, 99]},
+            "velocity of j1 must be above 2 rad/s and at most 4 rad/s, got 1.25 rad/s",
+        ),
+        ({"acceleration": [9, 3]}, r"acceleration of j2 must be at least 16 rad/s\^2, got 3 rad/s\^2"),
+        ({"acceleration": [7, 99]}, r"acceleration of j1 must be at least 8 rad/s\^2, got 7 rad/s\^2"),
+    ],
+)
+def test_of_joints_on_one_line_the_one_that_binds_is_named(fields: dict[str, Any], match: str) -> None:
+    planner, start, robot = two_joints({"joints": [-2, 4]}, duration=1.0, **fields)
+    with pytest.raises(PlanningError) as caught:
+        planner.plan(start, robot)
+    job = {"version": 1, "robot": {"joints": 2}, "moves": [{"planner": "hold", "duration": 1}]}
+    assert re.search(match, str(caught.value.said_by(loaded(job | {"start": {"joints": [0, 0]}}).say)))
+
+
+@pytest.mark.parametrize("velocity", [(0.1, -2e-4), (0.1, 2e-4), (-0.1, 2e-4)])
+def test_a_start_beside_the_line_is_refused_by_its_joint(velocity: tuple[float, float]) -> None:
+    planner, start, robot = two_joints({"joints": [1, 0]}, velocity, acceleration=[3, 3], overshoot=True)
+    with pytest.raises(PlanningError, match="of j2 leaves it"):
+        planner.plan(start, robot)
+
+
+@pytest.mark.parametrize(
+    ("target", "start", "fields"),
+    [
+        ({"joints": [1, 0]}, (0, 0.5), {"synchronize": "none", "overshoot": True}),
+        ({"joints": [1, 0], "velocity": [0, 0.5]}, (0, 0), {"synchronize": "none", "overshoot": True}),
+        ({"joints": [1, 1]}, (0, 0), {"duration": 3.0}),
+    ],
+)
+def test_a_joint_whose_ramps_nothing_limits_is_named(target: Any, start: Any, fields: dict[str, Any]) -> None:
+    limits = {"velocity": 1, "acceleration": [2, None]}
+    planner, state, robot = two_joints(target, start, limits, **fields)
+    with pytest.raises(MissingLimitError, match="j2"):
+        planner.plan(state, robot)
+
+
+def test_joints_that_arrive_by_themselves_wait_for_the_least_duration_or_for_hardly_a_moment() -> None:
+    limits = {"velocity": 1, "acceleration": 4}
+    planner, start, robot = two_joints({"joints": [2, 1.9995]}, limits=limits, synchronize="none")
+    assert planner.plan(start, robot).arrivals == pytest.approx((2.25, 2.2495), rel=1e-12)
+    fields = {"synchronize": "none", "minimum_duration": 5.0}
+    planner, start, robot = two_joints({"joints": [2, 0]}, limits=limits, **fields)
+    planned = planner.plan(start, robot)
+    assert planned.curve.end == pytest.approx(5.0, rel=1e-12)
+    assert not planned.curve.evaluate(np.linspace(0, 5, 20))[:, 1].any()
+
+
+@pytest.mark.parametrize("first", [0.0, 0.4])
+def test_a_least_duration_changes_no_velocity_at_an_end(first: float) -> None:
+    for last in (0.0, 0.5):
+        planned = trapezoid(2.0, first, last, velocity=1.0, acceleration=4.0, minimum_duration=5.0)
+        assert planned is not None
+        assert planned.curve.end == pytest.approx(5.0, rel=1e-12)
+        (begin, _), (_, end) = (ends[[0, -1], 0] for ends in planned.curve.piece_ends(1))
+        assert (begin, end) == pytest.approx((first, last), abs=1e-12)
+        assert planned.curve.piece_ends(0)[1][-1, 0] == pytest.approx(2.0, rel=1e-12)
+
+
+def test_a_target_that_is_the_start_takes_the_time_that_is_asked_for() -> None:
+    """At rest it waits; in motion it cannot be passed later without going back to it."""
+    assert trapezoid(0.0, acceleration=1.0, minimum_duration=2.0).curve.end == 2.0
+    fields = {"synchronize": "none", "overshoot": True, "acceleration": 1.0}
+    assert trapezoid(0.0, 0.5, 0.5, **fields).curve.end == 0.0
+    for name in ("duration", "minimum_duration"):
+        assert trapezoid(0.0, 0.5, 0.5, **fields, **{name: 8.0}) is None
+
+
+@pytest.mark.parametrize(
+    ("distance", "first", "last"), [(0.125, 0.5, 0.0), (-0.5, 0.0, -1.0), (0.0, 0.5, -0.5)]
+)
+def test_where_braking_takes_the_whole_distance_the_joint_waits_at_rest(
+    distance: float, first: float, last: float
+) -> None:
+    """The shorter duration that is left after braking is not the only one: a cruise may have no velocity at all."""
+    fields = {"synchronize": "none", "overshoot": True, "acceleration": 1.0}
+    for duration in (1.0, 1.5, 8.0):
+        planned = trapezoid(distance, first, last, duration=duration, **fields)
+        assert planned is not None
+        assert planned.curve.end == pytest.approx(duration, rel=1e-12)
+        assert planned.curve.piece_ends(0)[1][-1, 0] == pytest.approx(distance, abs=1e-12)
+        assert planned.curve.piece_ends(1)[1][-1, 0] == pytest.approx(last, abs=1e-12)
+        assert np.abs(planned.curve.piece_ends(2)).max() <= 1.0 + 1e-9
+
+
+def test_given_duration_and_speed_lead_backwards_as_forwards() -> None:
+    forth, back = (trapezoid(sign * 3.0, duration=4.0, velocity=1.0) for sign in (1, -1))
+    t = np.linspace(0, 4, 50)
+    np.testing.assert_allclose(back.curve.evaluate(t), -forth.curve.evaluate(t), rtol=0, atol=1e-15)
+    assert np.abs(back.curve.evaluate(2.0, 1)[0]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("fields", "match"),
+    [
+        ({"duration": 1.0, "velocity": 3.0, "acceleration": 9.0}, "ask too much of a trapezoid"),
+        ({"duration": 1.0, "minimum_duration": 2.0}, "exclude each other"),
+        ({"duration": 1.0, "velocity": 3.0, "overshoot": True}, "does not overshoot"),
+    ],
+)
+def test_fields_that_do_not_go_together_are_refused(fields: dict[str, Any], match: str) -> None:
+    with pytest.raises(InputError, match=match):
+        trapezoid(1.0, **fields)
 
 
 @pytest.mark.parametrize(
@@ -280,6 +408,7 @@ def test_a_joint_that_arrives_moving_cannot_wait() -> None:
         ({"duration": 1.0, "velocity": 3.0, "start_velocity": 3.0, "end_velocity": 3.0}, "at no velocity"),
         ({"duration": 1.05, "velocity": 1.5, "deceleration": 1.1}, "at no velocity does j1 cover its dist"),
         ({"duration": 1.0, "velocity": 3.0, "start_velocity": -1.0}, "turn round"),
+        ({"duration": 1.0, "velocity": 3.0, "end_velocity": -1.0}, "turn round"),
         ({"duration": 1.0, "acceleration": 3.0}, r"at least 4 rad/s\^2, got 3 rad/s\^2"),
         ({"duration": 1.0, "acceleration": 2.0, "deceleration": 3.0}, "at least 1.29099445 s"),
         ({"duration": 9.0, "acceleration": 2.0, "start_velocity": 2.0, "end_velocity": 1.0}, "and at most"),

@@ -138,6 +138,7 @@ def test_moves_that_have_no_such_law_say_so() -> None:
         ({"velocity": [0.3, 0.5]}, (0.3, 2.5)),
         ({"acceleration": [1.5, 9.0]}, (0.8, 1.5)),
         ({"acceleration": [3.5, 9.0], "deceleration": [1.0, 9.0]}, (0.8, 1.0)),
+        ({"acceleration": [1.5, 9.0], "deceleration": [2.0, 9.0]}, (0.8, 1.5)),
         ({"duration": 4.001}, (0.8, 2.5)),
     ],
 )
@@ -158,3 +159,13 @@ def test_a_trapezoid_of_whole_periods_is_the_shortest_within_what_is_given(
     assert possible(0.9, bounds, count, period, smooth=False, slack=1e-9)
     assert not possible(0.9, bounds, count - 1, period, smooth=False, slack=-1e-9)
     assert [phase.name for phase in planned.phases] == ["accelerate", "cruise", "decelerate"]
+
+
+def test_a_short_trapezoid_of_whole_periods_has_no_cruise_and_a_longer_one_takes_its_least_duration() -> None:
+    robot, still = arm([1.0, 1.0], [2.0, 2.0], [INF, INF]), state([0.0, 0.0])
+    short = trapezoid_to([0.02, 0.005]).on_rows(still, robot, 0.05, 0.0)
+    assert short is not None
+    assert [phase.name for phase in short.phases] == ["accelerate", "decelerate"]
+    longer = trapezoid_to([0.02, 0.005], duration=0.5).on_rows(still, robot, 0.05, 2.96)
+    assert longer is not None
+    assert longer.curve.duration == pytest.approx(3.0, rel=1e-12)

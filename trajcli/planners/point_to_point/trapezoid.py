@@ -184,7 +184,7 @@ class Trapezoid(PointToPoint):
             )
         profile = fastest_profile(distance, initial, final, forward, backward, overshoot=self.overshoot)
         least = self.minimum_duration or 0.0
-        if profile.duration >= least or profile.duration == 0:
+        if profile.duration >= least or not (profile.duration or initial):
             return profile
         if initial == 0 and final == 0:
             return profile.stretched(least / profile.duration)
