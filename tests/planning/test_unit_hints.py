@@ -10,6 +10,7 @@ import pytest
 
 from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text, load_job
+from trajcli.planning.advice import unit_hint
 from trajcli.planning.plan import plan_job
 
 JOINTS = "start: {joints: [0, -90, 90, 0, 90, 0]}\n"
@@ -58,18 +59,14 @@ def test_numbers_that_fit_or_have_their_unit_get_no_hint_about_units() -> None:
 
 
 def test_an_arc_that_goes_round_several_times_is_no_arc_in_degrees() -> None:
-    """Five turns are 31.4 rad: read in degrees they would be a tenth of one."""
-    helix = (
-        "{planner: arc, center: [0.5, 0.1, 0.3], axis: [0, 0, 1], angle: 31.4, pitch: 0.3, orientation: fixed"
-    )
-    text = (
-        "version: 1\nrobot: ur5e\nlimits: {tcp: {speed: 0.2, acceleration: 1}}\n"
-        "start: {xyz: [0.6, 0.1, 0.3], rpy: [3.14159, 0, 0]}\n"
-        f"moves: [{helix}}}]\n"
-    )
-    with pytest.raises(PlanningError) as caught:
-        plan_job(job_from_text(text, "job.yaml"))
-    assert all("degrees" not in (problem.hint or "") for problem in caught.value.problems)
+    """Five turns are 31.4 rad: read in degrees they would be a tenth of one. A pose turns by one at most."""
+    head = "version: 1\nrobot: ur5e\nstart: {joints: [0, -1.6, 1.6, 0, 1.6, 0]}\n"
+    helix = "{planner: arc, center: [0.5, 0.1, 0.3], axis: [0, 0, 1], angle: 31.4, pitch: 0.01}"
+    assert unit_hint(job_from_text(f"{head}moves: [{helix}]\n", "job.yaml")) is None
+    pose = "{xyz: [0.5, 0.1, 0.3], axis_angle: {axis: [1, 0, 0], angle: 31.4}}"
+    hint = unit_hint(job_from_text(f"{head}moves: [{{planner: quintic, to: {pose}}}]\n", "job.yaml"))
+    assert hint is not None
+    assert "angles up to 31.4 look like degrees" in hint
 
 
 def test_an_unreachable_point_is_named_where_it_stands_in_the_units_of_the_job() -> None:
@@ -108,3 +105,45 @@ def test_a_start_is_the_first_row_of_a_recording(tmp_path: Path) -> None:
         in problem.message
     )
     assert "`start: {csv: ...}`" in (problem.hint or "")
+
+
+GANTRY = "robot: {convention: standard, joints: [{name: turn, a: 0.4, d: -0.2}, {name: lift, type: prismatic, a: 0.3, d: 0.1}]}\n"  # 1 m of lengths: what is ten times as far is meant otherwise
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("start: {joints: [-90, 0]}\nmoves: [{planner: hold, duration: 1}]\n", "angles up to 90 |deg"),
+        ("start: {joints: [0, 0]}\nmoves: [{planner: hold, duration: 1}]\npoints: {a: {joints: [90, 0]}}\n", "90 |deg"),
+        ("start: {joints: [0, 0]}\nmoves: [{planner: quintic, to: {joints: {turn: -90, lift: 0}}}]\n", "90 |deg"),
+        ("start: {joints: [0, 0]}\nmoves: [{planner: quintic, to: {joints: {lift: -90, turn: 0}}}]\n", "lengths up to 90 |mm"),
+        ("start: {joints: [13, -90]}\nmoves: [{planner: hold, duration: 1}]\n", "13 .*lengths up to 90 |deg, length: mm"),
+        ("start: {joints: [0, 10.1]}\nmoves: [{planner: hold, duration: 1}]\n", "lengths up to 10.1 |mm"),
+        ("start: {joints: [0, 9.9]}\nmoves: [{planner: hold, duration: 1}]\n", ""),
+        ("start: {joints: [12.5, 0]}\nmoves: [{planner: hold, duration: 1}]\n", ""),
+        ("start: {joints: [-12.6, 0]}\nmoves: [{planner: hold, duration: 1}]\n", "12.6 |deg"),
+        ("start: {joints: [0, 0]}\nbase: {xyz: [0, 0, -700]}\nmoves: [{planner: hold, duration: 1}]\n", "700 |mm"),
+        ("start: {joints: [0, 0]}\ntool: {rpy: [0, 0, -180]}\nmoves: [{planner: hold, duration: 1}]\n", "180 |deg"),
+        ("units: {angle: deg}\nstart: {joints: [90, 0]}\nmoves: [{planner: hold, duration: 1}]\n", ""),
+        ("units: {length: mm}\nstart: {joints: [0, 90]}\nmoves: [{planner: hold, duration: 1}]\n", ""),
+        (
+            "units: {length: mm}\nstart: {joints: [90, 90]}\nmoves: [{planner: hold, duration: 1}]\n",
+            "90 |{angle: deg, length: mm}",
+        ),
+    ],
+)  # fmt: skip
+def test_which_numbers_are_too_large_for_what_they_measure(text: str, said: str) -> None:
+    hint = unit_hint(job_from_text(f"version: 1\n{GANTRY}{text}", "job.yaml"))
+    words, _, units = said.partition("|")
+    assert (hint is None) == (not said)
+    if hint is not None:
+        assert re.search(words, hint)
+        assert hint.endswith(f"{units.removesuffix('}')}}}`")
+        assert ("look like degrees" in hint) == ("deg" in units)
+
+
+def test_of_bare_joints_what_is_fifty_metres_away_is_too_far() -> None:
+    for value, hinted in ((51, True), (49, False)):
+        text = f"version: 1\nrobot: {{joints: [{{type: prismatic}}]}}\nstart: {{joints: {value}}}\n"
+        hint = unit_hint(job_from_text(text + "moves: [{planner: hold, duration: 1}]\n", "job.yaml"))
+        assert (hint is not None) == hinted
