@@ -388,3 +388,27 @@ def test_motion_is_a_value(pick_log: Path) -> None:
     motion = read_mcap(pick_log)
     assert isinstance(motion, LoggedMotion)
     assert (motion.topic, motion.file) == ("/joint_states", str(pick_log))
+
+
+def test_efforts_and_velocities_are_read_as_what_they_are(tmp_path: Path) -> None:
+    """Of position, velocity and effort each may be there or not; a JointState has no acceleration."""
+    values = np.random.default_rng(5).normal(size=(20, 9))
+    for qd, effort in ((True, True), (False, True), (True, False)):
+        messages = [
+            state(10**18 + k * 10**7, row[:3], row[3:6] if qd else (), effort=row[6:] if effort else ())
+            for k, row in enumerate(values)
+        ]
+        found = read_mcap(bag(tmp_path / "a.mcap", {"/joint_states": (STATE, messages)}))
+        np.testing.assert_array_equal(found.position, values[:, :3])
+        np.testing.assert_array_equal(found.velocity, values[:, 3:6] if qd else np.empty((20, 0)))
+        np.testing.assert_array_equal(found.effort, values[:, 6:] if effort else np.empty((20, 0)))
+        assert found.acceleration.shape == (20, 0)
+
+
+def test_points_before_the_start_of_a_trajectory_have_negative_times(tmp_path: Path) -> None:
+    """A duration of -0.25 s is -1 s and 750,000,000 ns."""
+    _, message = trajectory(3)
+    message["points"][0]["time_from_start"] = {"sec": -1, "nanosec": 750_000_000}
+    kind = "trajectory_msgs/msg/JointTrajectory"
+    found = read_mcap(bag(tmp_path / "a.mcap", {"/plan": (kind, [message])}))
+    assert found.times[0] == -0.25
