@@ -119,3 +119,26 @@ def test_no_move_loses_the_limit_of_jerk_without_which_it_cannot_be_planned(
     assert "null" not in hint
     free = hints(planned(limits, to("cubic", duration=3)))["acceleration_jump"] or ""
     assert free.endswith("or say limits: {jerk: null}")
+
+
+@pytest.mark.parametrize("before", [0, 1])
+def test_a_step_where_two_moves_meet_is_advised_for_either(before: int) -> None:
+    """The cubic begins without acceleration, as 6 d = 4 v T; the move before ends with 0.4 rad/s^2."""
+    velocity, duration = 0.4, 3.0
+    middle = {"joints": [0.5, 0.3], "velocity": [velocity, 0], "acceleration": [0.4, 0]}
+    moves = [
+        *([{"planner": "quintic", "to": {"joints": [0.1, 0]}, "duration": 6}] * before),
+        {"planner": "quintic", "to": middle, "duration": 2.5},
+        {
+            "planner": "cubic",
+            "to": {"joints": [0.5 + 2 * velocity * duration / 3, 0.3]},
+            "duration": duration,
+        },
+    ]
+    meeting, own = "let the moves meet without acceleration, or ", "use jerk_limited or quintic"
+    free = ", or say limits: {jerk: null}"
+    plan = planned(JERK, *moves)
+    assert hints(plan, before) == {"acceleration_jump": f"{meeting}{own} for move {before + 1}{free}"}
+    assert hints(plan, before + 1) == {"acceleration_jump": f"{own}{free}"}
+    del middle["acceleration"]
+    assert hints(planned(JERK, *moves), before) == {}
