@@ -47,7 +47,7 @@ def axis_of(axis: str | list[float]) -> np.ndarray:
     return vector / np.linalg.norm(vector)
 
 
-AXES = ["x", "y", "z", [0, 0, -2], [1.0, -2.0, 0.5], [1e-14, 0.0, 1.0]]
+AXES = ["x", "y", "z", [0, 0, -2], [1.0, -2.0, 0.5], [1e-14, 0.0, 1.0], [5e-4, 0.0, 1.0]]
 
 
 @pytest.mark.parametrize("convention", ["standard", "modified"])
@@ -71,6 +71,30 @@ def test_the_arm_stands_on_its_mount_and_is_carried_along_the_axis(
     assert on_rail.joint_types == ("prismatic", "revolute", "prismatic", "revolute")
     assert on_rail.limits.position[0].tolist() == [-2, 3]
     assert on_rail.limits.velocity.tolist()[1] == [-2, 2]
+
+
+def test_a_job_places_the_rail_and_not_the_arm_on_it() -> None:
+    """T(q) = T_job T(axis s) T_mount T_arm(q): the base of the job is that of the rail."""
+    arm = {"convention": "modified", "joints": JOINTS, "base": STANDS}
+    rail = {"rail": {"axis": [1, 2, 3]}, "arm": arm, "mount": MOUNT}
+    alone, on_rail = robot_of(arm, 3), robot_of(rail, 4, base={"xyz": [7, 8, 9], "rpy": [0.1, 0.2, 0.3]})
+    place = pose_of({"xyz": [7, 8, 9], "rpy": [0.1, 0.2, 0.3]})
+    row = np.array([0.8, 0.3, -0.4, 1.1])
+    carried = shifted(axis_of([1, 2, 3]) * 0.8) @ pose_of(MOUNT)
+    expected = place @ carried @ np.linalg.inv(alone.base) @ forward(alone, row[1:])
+    np.testing.assert_allclose(forward(on_rail, row), expected, rtol=0, atol=1e-12)
+
+
+def test_a_rail_in_millimetres_under_an_arm_in_degrees() -> None:
+    slide = {"axis": "x", "position": [-2000, 3000], "velocity": 500}
+    turning = {"name": "a", "theta": 90, "a": 400, "position": [-90, 180]}
+    robot = robot_of(
+        {"rail": slide, "arm": {"convention": "standard", "joints": [turning]}},
+        2,
+        units={"angle": "deg", "length": "mm"},
+    )
+    assert robot.limits.position.tolist() == [[-2, 3], [pytest.approx(-np.pi / 2), pytest.approx(np.pi)]]
+    assert robot.limits.velocity[0].tolist() == [-0.5, 0.5]
 
 
 def test_what_the_slide_says_of_itself_is_that_of_the_first_joint() -> None:
@@ -102,6 +126,20 @@ def test_what_the_slide_says_of_itself_is_that_of_the_first_joint() -> None:
     bounds = [limits.velocity, limits.acceleration, limits.jerk, limits.effort]
     assert [bound[0].tolist() for bound in bounds] == [[-0.2, 0.3], [-2, 2], [-30, 30], [-800, 900]]
     assert limits.effort[1:].tolist() == [[-50, 50]] * 3
+    # an effort is a limit where those of the arm are, and where the carriage has a mass
+    light = {name: value for name, value in slide.items() if name != "mass"}
+    bare = {"convention": "standard", "joints": JOINTS}
+    for rail, carried in ((light, arm), (slide, bare)):
+        assert robot_of({"rail": rail, "arm": carried}, 4).limits.effort[0].tolist() == [-np.inf, np.inf]
+
+
+def test_limits_of_the_arm_stay_with_its_joints() -> None:
+    near = {"deceleration": 5, "offset": 0.1}
+    first = {**JOINTS[0], "position": [-2, 2], "velocity_by_position": near}
+    arm = {"convention": "standard", "joints": [first, *JOINTS[1:]]}
+    limits = robot_of({"rail": {"axis": "y"}, "arm": arm}, 4).limits
+    assert limits.velocity_by_position.tolist() == [[np.inf, 0], [5, 0.1], [np.inf, 0], [np.inf, 0]]
+    assert limits.position.tolist()[:2] == [[-np.inf, np.inf], [-2, 2]]
 
 
 @pytest.mark.parametrize(

@@ -182,3 +182,77 @@ def test_a_tool_may_point_straight_up_or_down(pitch: float, up: int) -> None:
     plan = planned("{xyz: [400, 100, 300], pitch: " + str(pitch) + "}")
     pose = tcp_of(plan.loaded.robot, ends(plan))
     np.testing.assert_allclose(pose[:3, 2], [0, 0, up], atol=1e-8, rtol=0)
+
+
+def branches() -> dict[str, np.ndarray]:
+    """Return the joints of each branch that reaches the pose, rad, by its names."""
+    return {
+        f"{s} {e} {w}": ends(
+            planned("{" + DOWN + f", configuration: {{shoulder: {s}, elbow: {e}, wrist: {w}}}" + "}")
+        )
+        for s in ("left", "right")
+        for e in ("up", "down")
+        for w in ("flip", "no_flip")
+    }
+
+
+def started(joints: np.ndarray) -> str:
+    """Return the job that begins at joints, rad."""
+    return JOB.replace("[0, -90, 90, 0, 90, 0]", str(np.degrees(joints).tolist()))
+
+
+def test_from_each_branch_the_nearest_is_the_same_branch_and_not_that_nearest_to_zero() -> None:
+    for name, joints in branches().items():
+        plan = planned("{xyz: [402, 99, 251], rpy: [179, 0, 1]}", started(joints))
+        assert np.abs(ends(plan) - joints).max() < 0.1, name
+
+
+def test_a_branch_outside_of_the_limits_is_no_choice() -> None:
+    """Where the elbow bends to one side alone, half of the branches are left: others than were asked for are named."""
+    every = branches()
+    bent = JOB.replace("limits: {", "limits: {position: {elbow_joint: [10, 170]}, ")
+    left = {name for name, joints in every.items() if joints[2] > 0}
+    assert len(left) == 4
+    assert "left up flip" not in left
+    for shoulder in ("left", "right"):
+        joints = ends(planned("{" + DOWN + f", configuration: {{shoulder: {shoulder}}}" + "}", bent))
+        assert min(np.abs(joints - every[name]).max() for name in left if shoulder in name) < 1e-9
+    with pytest.raises(PlanningError) as caught:
+        planned("{" + DOWN + ", configuration: {shoulder: left, elbow: up}}", bent)
+    (problem,) = caught.value.problems
+    assert problem.message.endswith("does not reach the pose within its limits in the configuration left up")
+    assert set((problem.hint or "").removeprefix("it does in: ").split(", ")) == left
+
+
+def test_a_pose_may_be_passed_in_motion() -> None:
+    rates = "velocity: {elbow_joint: 5}, acceleration: {wrist_1_joint: -3}"
+    plan = planned("{" + DOWN + ", " + rates + "}")
+    end = plan.trajectory.end
+    np.testing.assert_allclose(np.degrees(end.velocity), [0, 0, 5, 0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(np.degrees(end.acceleration), [0, 0, 0, -3, 0, 0], atol=1e-12)
+
+
+def test_of_several_branches_of_a_start_the_one_that_is_taken_is_named() -> None:
+    target = "{joints: [0, -90, 90, 0, 90, 0]}"
+    place = JOB.replace("{joints: [0, -90, 90, 0, 90, 0]}", "{" + DOWN + "MORE}").replace("TARGET", target)
+    for more, count in (("", 8), (", configuration: {elbow: up}", 4)):
+        plan = planned("", place.replace("MORE", more))
+        said = [event.message for event in (*plan.events, *plan.remarks) if event.kind == "branch_taken"]
+        assert len(said) == 1
+        assert said[0].startswith(f"{count} branches reach the start: ")
+        assert said[0].endswith("`configuration` says another")
+    only = ", configuration: {shoulder: left, elbow: up, wrist: flip}"
+    plan = planned("", place.replace("MORE", only))
+    assert "branch_taken" not in {event.kind for event in (*plan.events, *plan.remarks)}
+
+
+def test_a_matrix_is_mended_from_the_last_bits_on() -> None:
+    """4 x 4 or 3 x 3: off by 1e-9 it is told, off by 1e-15 it is a rotation."""
+    for off, told in ((1e-9, True), (1e-15, False)):
+        for rows in (
+            f"[1, 0, 0], [0, -1, {off!r}], [0, 0, -1]",
+            f"[1, 0, 0, 400], [0, -1, {off!r}, 100], [0, 0, -1, 250], [0, 0, 0, 1]",
+        ):
+            place = "" if "400" in rows else "xyz: [400, 100, 250], "
+            plan = planned("{" + place + "matrix: [" + rows + "]}")
+            assert [event.kind for event in plan.events] == ["nearest_rotation"] * told
