@@ -332,3 +332,55 @@ def test_a_higher_limit_costs_no_time() -> None:
     found = saved(plan)
     assert len(found) >= 4
     assert min(0.0 if value is None else value for value in found.values()) == 0.0
+
+
+def test_a_duration_that_was_asked_for_is_the_least_that_a_higher_limit_saves() -> None:
+    """2 rad with v = 1 and a = 3 take 2 + 1/3 s: asked for are 2.3 s, which v = 1.1 would allow."""
+    move = {"planner": "time_optimal", "through": [{"joints": [1]}], "to": {"joints": [2]}, "duration": 2.3}
+    plan = planned({**move, "when_over_limit": "slow"}, {"velocity": 1, "acceleration": 3})
+    assert plan.trajectory.duration == pytest.approx(7 / 3, rel=1e-3)
+    assert saved(plan)[0, 1] == pytest.approx(plan.trajectory.duration - 2.3, rel=1e-6)
+    enough = planned({**move, "duration": 5, "when_over_limit": "slow"}, {"velocity": 1, "acceleration": 3})
+    assert saved(enough) == {}
+
+
+def test_of_a_law_at_its_limits_the_joints_that_bind_are_named_the_longest_first() -> None:
+    """The second joint goes half as far with a tenth of the limit: it binds, and the first one never."""
+    through = [{"joints": [0.5, 0.25]}]
+    move = {"planner": "time_optimal", "through": through, "to": {"joints": [1, 0.5]}}
+    plan = planned(move, {"velocity": [5, 0.5], "acceleration": [20, 2]}, joints=2)
+    times = times_at_limits(plan.moves[0])
+    assert {(one.joint, one.method) for one in times} == {(1, "phases")}
+    # 0.5 rad with 0.5 rad/s and 2 rad/s^2: 0.25 s of acceleration at each end, 0.75 s of velocity
+    assert [one.quantity for one in times] == ["velocity", "acceleration"]
+    assert [one.seconds for one in times] == pytest.approx([0.75, 0.5], abs=0.02)
+    swapped = planned(move, {"velocity": [5, 5], "acceleration": [20, 2]}, joints=2)
+    assert [one.quantity for one in times_at_limits(swapped.moves[0])] == ["acceleration"]
+
+
+def test_the_longest_time_at_a_limit_comes_first() -> None:
+    """3 rad: 2.5 s at the velocity, 1 s of acceleration; 1.2 rad: 0.7 s and 1 s."""
+    for distance, first in ((3, "velocity"), (1.2, "acceleration")):
+        plan = planned(
+            {"planner": "trapezoid", "to": {"joints": [distance]}}, {"velocity": 1, "acceleration": 2}
+        )
+        times = times_at_limits(plan.moves[0])
+        assert times[0].quantity == first
+        assert sorted((one.seconds for one in times), reverse=True) == [one.seconds for one in times]
+
+
+def test_after_its_time_each_limit_is_named_and_none_is_planned() -> None:
+    plan = planned({"planner": "trapezoid", "to": {"joints": [3, 3]}}, {"velocity": 1, "acceleration": 2}, 2)
+    late = list(savings_of(plan, [0], seconds=-1.0))
+    assert {(one.joint, one.order, one.saved) for one in late} == {
+        (joint, order, None) for joint in (0, 1) for order in (1, 2)
+    }
+    assert {one.reason for one in late} == {"not planned: -1 s have passed"}
+
+
+def test_where_no_limit_of_a_joint_binds_those_of_joints_that_move_are_tried() -> None:
+    """The speed of the tool holds it: a joint that stands still has nothing to do with that."""
+    move = {"planner": "quintic", "to": {"joints": [1, 0]}}
+    limits = {"velocity": 5, "acceleration": [30, 40], "tcp": {"speed": 0.2}}
+    plan = planned(move, limits, joints=2, robot="planar2r")
+    assert saved(plan) == {(0, 1): pytest.approx(0, abs=1e-9), (0, 2): pytest.approx(0, abs=1e-9)}
