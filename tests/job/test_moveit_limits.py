@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import inf
 from pathlib import Path
 
@@ -229,3 +230,24 @@ def test_one_sided_limits_are_written_with_null_and_read_again(tmp_path: Path) -
     assert of_joint(loaded, 1)["acceleration"] == [-2, inf]
     again = job_from_text(dump_job(loaded))
     assert [of_joint(again, joint) for joint in (0, 1)] == [of_joint(loaded, joint) for joint in (0, 1)]
+
+
+def test_factors_beside_the_joints_are_noted_and_are_none_of_them(tmp_path: Path) -> None:
+    factors = "  default_velocity_scaling_factor: 0.1\n  default_acceleration_scaling_factor: 0.2\n"
+    loaded = load(tmp_path, "joint_limits:\n" + factors + "  turn:\n" + TURN + "  slide: {max_jerk: 3}\n")
+    (said,) = [note for note in notes(loaded) if "ignored" in note]
+    assert "default_velocity_scaling_factor 0.1 and default_acceleration_scaling_factor 0.2 ignored" in said
+
+
+@pytest.mark.parametrize(
+    ("entry", "unit"),
+    [("max_velocity", "m/s"), ("max_deceleration", "m/s^2"), ("max_jerk", "m/s^3"), ("min_position", "m")],
+)
+def test_numbers_of_a_slide_are_lengths(entry: str, unit: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=re.escape(f"expected a number ({unit}), got true")):
+        load(tmp_path, f"joint_limits:\n  slide:\n    {entry}: true\n")
+
+
+def test_a_number_that_no_robot_has_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected at least 1e-12 rad/s, got 1e-300"):
+        load(tmp_path, "joint_limits:\n  turn:\n    max_velocity: 1e-300\n")

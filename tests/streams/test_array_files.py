@@ -199,3 +199,84 @@ def test_numbers_begin_at_a_multiple_of_64_bytes_as_the_format_asks(columns: int
     assert header.endswith(b" \n")
     shape, fortran, dtype = np.lib.format.read_array_header_1_0(io.BytesIO(header[8:]))
     assert (shape, fortran, len(dtype.names or ())) == ((12,), False, columns)
+
+
+MANY = 18_000  # more than are read at a time
+
+
+@pytest.mark.parametrize("ending", ["plain", "fields", "npz"])
+def test_a_number_that_is_none_is_named_by_its_column_and_row(ending: str, tmp_path: Path) -> None:
+    """Behind the first block, and beside a column that is not read."""
+    t, q = np.arange(MANY) / 100, np.zeros((MANY, 2))
+    q[17_000, 1] = np.nan
+    path = tmp_path / ("a.npz" if ending == "npz" else "a.npy")
+    if ending == "plain":
+        np.save(path, np.column_stack([t, q]))
+    elif ending == "npz":
+        np.savez(path, other=np.zeros(MANY), t=t, q=q)
+    else:
+        rows = np.zeros(MANY, dtype=[("other", "f8"), ("t", "f8"), ("q", "f8", (2,))])
+        rows["t"], rows["q"] = t, q
+        np.save(path, rows)
+    with pytest.raises(InputError, match="q2 is nan in row 17001"):
+        open_motion(path, units="rad")
+
+
+def test_a_file_that_is_cut_says_how_many_rows_it_has(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.column_stack([np.arange(MANY) / 100, np.zeros((MANY, 2))]))
+    whole = (tmp_path / "a.npy").read_bytes()
+    (tmp_path / "a.npy").write_bytes(whole[: -3 * 24 - 5])
+    with pytest.raises(InputError, match=f"has {MANY - 4} of {MANY} rows"):
+        open_motion(tmp_path / "a.npy", units="rad")
+
+
+@pytest.mark.parametrize("ending", ["npy", "npz"])
+def test_each_field_is_rounded_as_its_own_type_is(ending: str, tmp_path: Path) -> None:
+    """2^-24 of single precision and 2^-11 of half; whole numbers and times in double precision are exact."""
+    parts = {
+        "t": np.arange(5.0),
+        "q": np.ones((5, 2), "f4"),
+        "qd": np.zeros((5, 2), "f2"),
+        "move": np.zeros(5, "i8"),
+    }
+    path = tmp_path / f"a.{ending}"
+    if ending == "npz":
+        np.savez(path, **parts, also=np.array(3.0), said=np.ones((5, 2), bool))
+    else:
+        rows = np.zeros(5, dtype=[(name, each.dtype, each.shape[1:]) for name, each in parts.items()])
+        for name, each in parts.items():
+            rows[name] = each
+        np.save(path, rows)
+    motion = open_motion(path, units="rad")
+    assert motion.quantities == ("q", "qd", "move")
+    assert motion.resolution.relative == (2.0**-24, 2.0**-11, 0.0)
+    assert motion.resolution.relative_time == 0.0
+    assert motion.unread == ()
+
+
+def test_whole_numbers_are_positions_and_arrays_of_other_lengths_are_named(tmp_path: Path) -> None:
+    arrays = {
+        "t": np.arange(4),
+        "q": np.arange(8).reshape(4, 2),
+        "images": np.zeros((4, 2, 2)),
+        "fps": np.zeros(1),
+    }
+    np.savez(tmp_path / "a.npz", **arrays)
+    motion = open_motion(tmp_path / "a.npz", units="rad")
+    assert motion.whole().q.tolist() == [[0, 1], [2, 3], [4, 5], [6, 7]]
+    assert "arrays that are not read: images, fps" in motion.notes
+    np.save(tmp_path / "a.npy", np.column_stack([arrays["t"], arrays["q"]]))
+    assert open_motion(tmp_path / "a.npy", units="rad").whole().q.tolist() == arrays["q"].tolist()
+
+
+@pytest.mark.parametrize("shape", [(0,), (2, 0), (2, 2, 2), ()])
+def test_fields_in_rows_or_chunks_of_rows(shape: tuple[int, ...], tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.zeros(shape, dtype=[("t", "f8"), ("q", "f8", (2,))]))
+    with pytest.raises(InputError, match="a structured array of shape"):
+        open_motion(tmp_path / "a.npy", units="rad")
+
+
+def test_a_table_of_times_alone_is_none(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.arange(5.0)[:, None])
+    with pytest.raises(InputError, match="no table of rows"):
+        open_motion(tmp_path / "a.npy", units="rad")
