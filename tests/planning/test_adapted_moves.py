@@ -94,9 +94,9 @@ def test_moves_of_a_plan_are_stretched_repeated_and_slowed() -> None:
     assert slowed.fastest["a"].duration == pytest.approx(0.5 * 15 / 8 / 0.5, rel=1e-6)
     assert slowed.chains is adapted.chains
     grid = (100.0, False)
-    adapted.known[adapted.whole_key(0, START, grid)] = first
+    adapted.planned[adapted.whole_key(0, START, grid)] = first
     adapted.note_repeated(0, 7, START, grid)
-    again = adapted.known[adapted.whole_key(7, START, grid)]
+    again = adapted.planned[adapted.whole_key(7, START, grid)]
     assert (again.index, again.duration) == (7, first.duration)
     kept = without_bounds(replace(first.planned, binding_phases=True))
     assert not kept.binding_phases

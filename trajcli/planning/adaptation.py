@@ -30,7 +30,7 @@ class Adaptation:
             larger one's, and the other one is as many times tighter.
         stretches: How many times longer a move lasts behind that, by its index.
         period: Of rows on which the breaks of their curves shall fall, s; None for any.
-        known: Moves that were planned already, with all that they depend on, their rows too.
+        planned: Moves that were planned already, with all that they depend on, their rows too.
         fastest: Likewise, as their planners and limits make them, by `key`.
         chains: Chains that fly by corners, likewise, before they are stretched.
     """
@@ -38,7 +38,7 @@ class Adaptation:
     caps: Mapping[Cap, float] = field(default_factory=dict)
     stretches: Mapping[int, float] = field(default_factory=dict)
     period: float | None = None
-    known: dict[Any, PlannedMove] = field(default_factory=dict)
+    planned: dict[Any, PlannedMove] = field(default_factory=dict)
     fastest: dict[Any, PlannedMove] = field(default_factory=dict)
     chains: dict[Any, FlownChain] = field(default_factory=dict)
 
@@ -50,7 +50,7 @@ class Adaptation:
     def note_repeated(self, before: int, move: int, start: State, grid: tuple[float, bool]) -> None:
         """Note that a move is the same motion as one before, with the same start and nothing changed."""
         for noted, key, other in (
-            (self.known, self.whole_key(before, start, grid), self.whole_key(move, start, grid)),
+            (self.planned, self.whole_key(before, start, grid), self.whole_key(move, start, grid)),
             (self.fastest, self.key(before, start), self.key(move, start)),
         ):
             if key in noted:

@@ -320,12 +320,12 @@ def _plan_move(
 
     output = loaded.job.output
     key = adapted.whole_key(index, start, (output.rate, output.align))
-    move = adapted.known.get(key)
+    move = adapted.planned.get(key)
     if move is None:
         move = plan_move_within(loaded, index, planner, start, adapted.within(robot, index), adapted)
         if adapted.tightens(index):
             move = replace(move, robot=robot, planned=without_bounds(move.planned))
-        adapted.known[key] = move
+        adapted.planned[key] = move
     return move
 
 
