@@ -178,3 +178,19 @@ def test_rounding_is_not_a_corner():
 def test_wrong_accelerations_are_refused(a):
     with pytest.raises(ValueError, match="positive and finite"):
         blended_by_acceleration([0, 1], [[0.0], [1.0]], a)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_inner_points_are_passed_exactly_also_where_blends_are_shrunk(seed):
+    """A corner asks for much and the other one of its point for little: its blend ends at the point, not behind it."""
+    rng = np.random.default_rng(seed)
+    t, q = np.cumsum(rng.uniform(0.2, 2, 5)), np.cumsum(10 ** rng.uniform(-2, 1, (5, 2)), axis=0)
+    result = blended_by_acceleration(t, q, rng.uniform(0.1, 1, 2), exactly=True)
+    at = result.curve.evaluate(t + result.shift)
+    np.testing.assert_allclose(at[1:-1], q[1:-1], rtol=0, atol=1e-12 * np.abs(q).max())
+    assert_continuous(result.curve)
+    assert result.shrunk
+    for one in result.shrunk:
+        corners = np.flatnonzero(result.points == one.point)
+        assert one.used < one.asked
+        assert np.isclose(result.blends[corners, one.joint], one.used, rtol=1e-12).any()

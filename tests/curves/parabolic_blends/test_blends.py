@@ -153,3 +153,16 @@ def test_the_cost_is_linear():
         return calls_of(lambda: blended(t, q, 0.2, exactly=True))
 
     assert calls(10_000) < 1.5 * 10 * calls(1_000)
+
+
+@pytest.mark.parametrize("exactly", [False, True])
+def test_a_slow_joint_that_turns_without_a_blend_is_named_beside_a_fast_one(exactly):
+    q = np.array([[0.0, 0.0], [100.0, 1e-8], [200.0, 2e-8], [300.0, 2e-8]])
+    fields = {"exactly": exactly, "start_velocity": [100.0, 1e-8], "end_velocity": [100.0, 0.0]}
+    with pytest.raises(ValueError, match="0 s at point 2, where joint 1 changes its velocity by 1e-08"):
+        blended([0.0, 1.0, 2.0, 3.0], q, [0.2, 0.2, 0.0, 0.2], **fields)
+    q[:, 1] = 0.0
+    still = blended(
+        [0.0, 1.0, 2.0, 3.0], q, 0.0, exactly=exactly, start_velocity=[100.0, 0], end_velocity=[100.0, 0]
+    )
+    assert still.curve.end == 3.0

@@ -133,10 +133,11 @@ def _or_jerk_limited(start: Array, end: Array, robot: Robot) -> str:
     still = np.zeros_like(start[0])
     states = [State(*(rows[k] if k < len(rows) else still for k in range(3))) for rows in (start, end)]
     try:
-        plan_motion(Request(states[0], states[1], "position", "time", 0.0), robot)
+        curve = plan_motion(Request(states[0], states[1], "position", "time", 0.0), robot).curve
     except TrajcliError:
         return ""
-    return ", or use jerk_limited"
+    extremes = piece_extremes(curve.coefficients, curve.lengths, (0, 1, 2, 3))
+    return ", or use jerk_limited" if share_of_limits(extremes, robot.limits).max() < 1 + 10 * _ROOM else ""
 
 
 def _least_duration(start: Array, end: Array, limits: Limits) -> float:
