@@ -113,3 +113,51 @@ def test_lines_as_others_write_them(name, tmp_path):
     with pytest.raises(InputError) as caught:
         open_motion(tmp_path / name)
     assert caught.value.problems[0].place.line == 6
+
+
+LINE = '{"t": 0.0, "q": [0, 0]}\n'
+
+
+@pytest.mark.parametrize(
+    ("second", "message"),
+    [
+        ('{"t": 1.0, "q": [0, 0], "qd": [0, 0]}', "other keys or lists than in the first row"),
+        ('{"t": 1.0}', "other keys or lists than in the first row"),
+        ('{"t": 1.0, "q": [0, 0, 0]}', "other keys or lists than in the first row"),
+        ('{"t": [1.0], "q": [0, 0]}', "other keys or lists than in the first row"),
+        ('{"t": 1.0, "q": [0, true]}', "a value is no number"),
+        ('{"t": 1.0, "q": [0, [1]]}', "a value is no number"),
+        ('{"t": 1.0, "q": [0, 1e301]}', "a value is no number"),
+        ('{"t": 1.0, "q": [0, NaN]}', "no JSON"),
+        ("[1.0, 0, 0]", "expected an object of numbers"),
+        ("{}", "expected an object of numbers"),
+        ('{"t": 1.0, "q": [0,', "the file may have been cut"),
+    ],
+)
+def test_each_row_is_an_object_like_the_first(second, message, tmp_path):
+    (tmp_path / "a.jsonl").write_text(f"\n{LINE}\n{second}")
+    with pytest.raises(InputError) as caught:
+        open_motion(tmp_path / "a.jsonl", units="rad")
+    (problem,) = caught.value.problems
+    assert message in problem.text() or message in (problem.hint or "")
+    assert str(problem.place).endswith("a.jsonl:4:1")
+
+
+def test_the_decimals_of_all_blocks_count(tmp_path):
+    """Six in the first of 5000 rows, which are read 4096 at a time, and one in the others."""
+    rows = [f'{{"t": {k}.5, "q": [0.{"123456" if k == 0 else "5"}]}}' for k in range(5000)]
+    (tmp_path / "a.jsonl").write_text("\n".join(rows))
+    found = open_motion(tmp_path / "a.jsonl", units="rad")
+    assert found.resolution.q.tolist() == [pytest.approx(5e-7)]
+    assert (found.rows, found.resolution.time) == (5000, 0.05)
+
+
+def test_lists_of_texts_are_left_out_and_lists_of_unknown_numbers_refused(tmp_path):
+    (tmp_path / "a.jsonl").write_text('{"t": 0, "q": [0, 0], "names": ["a", "b"], "frame": "base"}\n')
+    assert open_motion(tmp_path / "a.jsonl", units="rad").notes[0] == "keys that are not read: names, frame"
+    (tmp_path / "a.jsonl").write_text('{"t": 0, "q": [0, 0], "gains": [1, 2]}\n')
+    with pytest.raises(InputError, match="unexpected list 'gains' of 2 numbers"):
+        open_motion(tmp_path / "a.jsonl", units="rad")
+    (tmp_path / "a.jsonl").write_text("\n \n")
+    with pytest.raises(InputError, match="has no rows"):
+        open_motion(tmp_path / "a.jsonl", units="rad")

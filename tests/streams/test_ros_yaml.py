@@ -142,3 +142,26 @@ def test_the_controller_of_these_tests_refuses_what_the_real_one_refuses():
     # the quintic from rest to rest
     position, velocity, _ = controller.run(GOOD, np.array([0.5]))
     assert (position[0, 0], velocity[0, 0]) == pytest.approx((0.5, 1.875))
+
+
+@pytest.mark.parametrize("message", ["ros", "ros-goal"])
+def test_points_without_accelerations_state_two_derivatives_and_no_more(message):
+    knots, names, out = small([[0.1, -0.2], [0.3, 0.4]]), ("a", "b"), io.BytesIO()
+    write_ros_yaml(names, knots, out, message, orders=2)
+    verify_ros_yaml(out, names, knots, message, orders=2)
+    content = content_of(out.getvalue())
+    points = (content["trajectory"] if message == "ros-goal" else content)["points"]
+    assert all(point.keys() == {"positions", "velocities", "time_from_start"} for point in points)
+    assert [point["velocities"] for point in points] == knots.velocity.tolist()
+    with pytest.raises(TrajcliError, match="point 0"):
+        verify_ros_yaml(out, names, knots, message)
+
+
+def test_many_points_are_all_there():
+    """2500 points are more than are written at a time."""
+    values = np.arange(2500.0)[:, None]
+    knots = Knots(np.arange(2500) * 10**6, values, values, values, None)
+    out = io.BytesIO()
+    write_ros_yaml(("a",), knots, out, "ros")
+    verify_ros_yaml(out, ("a",), knots, "ros")
+    assert out.getvalue().count(b"positions:") == 2500

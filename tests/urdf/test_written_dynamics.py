@@ -173,3 +173,29 @@ def test_one_end_that_is_far_out_is_no_end() -> None:
         )
         found = robot_of_urdf(text.encode(), "r.urdf").robot.limits.position[0].tolist()
         assert found == list(wanted)
+
+
+def test_what_a_snapped_angle_moves_is_bounded_by_all_lengths_behind_it() -> None:
+    """1.5708 is off a right angle by 3.7e-6: behind it 0.5 m, a slide out by 3 m at most, and 0.25 m."""
+    limit = '<limit lower="{}" upper="{}" effort="7" velocity="3"/>'
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
+        '<joint name="j" type="revolute"><origin rpy="0 1.5708 0"/><parent link="a"/><child link="b"/>'
+        + limit.format(-1, 1)
+        + '</joint><joint name="k" type="prismatic"><origin xyz="0 0.3 0.4"/><parent link="b"/><child link="c"/>'
+        + limit.format(-0.5, 3)
+        + '</joint><joint name="m" type="fixed"><origin xyz="0.25 0 0"/><parent link="c"/><child link="d"/></joint>'
+        "</robot>"
+    )
+    found = robot_of_urdf(text.encode(), "r.urdf")
+    (snapped,) = found.snapped
+    off = abs(1.5708 - np.pi / 2)
+    assert (snapped.joint, snapped.axis, snapped.written, snapped.taken) == ("j", "y", 1.5708, np.pi / 2)
+    assert snapped.distance == pytest.approx(off * 3.75, rel=1e-9)
+    assert (found.distance, found.turn) == (snapped.distance, pytest.approx(off, rel=1e-9))
+    said = float(str(snapped).rpartition("at most ")[2].split()[0])
+    assert found.distance <= said <= found.distance * 1.01
+    exact = robot_of_urdf(text.encode(), "r.urdf", exact=True).robot
+    q = np.array([0.7, 3.0])
+    moved = np.linalg.norm((forward(exact, q) - forward(found.robot, q))[:3, 3])
+    assert 0 < moved <= found.distance

@@ -153,8 +153,8 @@ def _of_configuration(
     for word in ({} if wanted is None else wanted.branch_names).values():
         has = np.array([word in name.split() for name in names])
         if not has.any():
-            known = sorted({part for name in names for part in name.split()} - {"only"})
-            hint = f"it has {', '.join(known)}" if known else f"its branches have no names ({method})"
+            words = sorted({part for name in names for part in name.split()} - {"only"})
+            hint = f"it has {', '.join(words)}" if words else f"its branches have no names ({method})"
             raise InputError(f"{robot.name} has no configuration '{word}'", hint=hint)
         chosen &= has
     return chosen

@@ -94,8 +94,8 @@ def _moving(joint: UrdfJoint, parent: str, robot: Robot, number: int) -> Iterato
     kind = "prismatic" if joint.prismatic else "continuous" if endless else "revolute"
     # one number stands for both directions: the smaller one is safe
     velocity = _bounded(float(np.abs(robot.limits.velocity[number]).min()))
-    known = min(map(abs, robot.joints[number].effort))
-    effort = "0" if known == np.inf else repr(known)
+    least = min(map(abs, robot.joints[number].effort))
+    effort = "0" if least == np.inf else repr(least)
     span = "" if endless else f'lower="{_bounded(low)!r}" upper="{_bounded(high)!r}" '
     yield f'  <joint name="{_escaped(joint.name)}" type="{kind}">'
     yield f'    <parent link="{parent}"/><child link="{joint.link}"/>'
