@@ -22,6 +22,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 
 _SHORT = 48  # unknowns: fewer are not worth halving
+_DENSE = 64  # unknowns: so many are solved by the inverse of their whole matrix
 _ROUNDING = 8 * np.finfo(np.float64).eps  # of a diagonal element: what forming a row may have cost
 
 
@@ -157,7 +158,7 @@ class CyclicFactors:
 
     Attributes:
         levels: From the finest on.
-        last: Inverse of the last block, shape (1, k, k).
+        last: Inverse of what the last level leaves, shape (m k, m k).
     """
 
     levels: tuple[_Level, ...]
@@ -170,7 +171,7 @@ class CyclicFactors:
     def _solved(self, right: Array, depth: int) -> Array:
         """Return the solution (b, k, 1) from one level on."""
         if depth == len(self.levels):
-            return np.asarray(self.last @ right)
+            return (self.last @ right.ravel()).reshape(right.shape)
         level = self.levels[depth]
         count, links = len(level.before), len(level.after)
         odd, even = right[1::2], right[0::2].copy()
@@ -195,7 +196,7 @@ def cyclic_factors(diagonal: Array, right: Array) -> CyclicFactors:
         LinAlgError: When a block that is eliminated is singular.
     """
     blocks, links, levels = diagonal, right, []
-    while len(blocks) > 1:
+    while len(blocks) > 1 and blocks.shape[0] * blocks.shape[1] > _DENSE:
         inverse, before, after = _inverse(blocks[1::2]), links[0::2], links[1::2]
         down, up = before @ inverse, np.swapaxes(after, 1, 2) @ inverse[: len(after)]
         kept = blocks[0::2].copy()
@@ -203,7 +204,17 @@ def cyclic_factors(diagonal: Array, right: Array) -> CyclicFactors:
         kept[1 : 1 + len(after)] -= up @ after
         levels.append(_Level(inverse, before, after, down, up))
         blocks, links = kept, -(down[: len(after)] @ after)
-    return CyclicFactors(tuple(levels), _inverse(blocks))
+    return CyclicFactors(tuple(levels), _inverse(_whole(blocks, links)))
+
+
+def _whole(blocks: Array, links: Array) -> Array:
+    """Return the matrix (b k, b k) of blocks (b, k, k) on its diagonal and links (b - 1, k, k) beside it."""
+    count, size, _ = blocks.shape
+    whole, at = np.zeros((count, size, count, size)), np.arange(count)
+    whole[at, :, at] = blocks
+    whole[at[:-1], :, at[1:]] = links
+    whole[at[1:], :, at[:-1]] = np.swapaxes(links, 1, 2)
+    return whole.reshape(count * size, count * size)
 
 
 @frozen

@@ -81,14 +81,14 @@ class ChainProgram:
         return _Pairs(slack, dual, _GAP / slack.size / over, over)
 
     def _objective(self, x: Array) -> tuple[Array, Array]:
-        """Return gradient (N + 1, 2) and the curvature of each interval, shape (4, 4, N)."""
+        """Return gradient (N + 1, 2) and the curvature of each interval, shape (N, 4, 4)."""
         root = 1.0 / np.sqrt(1.0 + _times(self.samples, x))
         slopes, curvatures = -0.5 * self.weights * root**3, 0.75 * self.weights * root**5
         return _scattered(self.samples, slopes), _squares(self.samples, curvatures)
 
     def _factored(self, weight: Array, curvature: Array) -> BlockFactors:
         """Return the factors of Newton's matrix with the rows weighed by (m, N)."""
-        local = np.moveaxis(curvature + _squares(self.rows, weight), 2, 0)
+        local = curvature + _squares(self.rows, weight)
         diagonal = np.zeros((len(local) + 1, 2, 2))
         diagonal[:-1] += local[:, :2, :2]
         diagonal[1:] += local[:, 2:, 2:]
@@ -197,8 +197,7 @@ class _Newton:
 
 def _times(rows: Array, x: Array) -> Array:
     """Return rows (4, m, N) times the unknowns around each interval, shape (m, N)."""
-    near, far = x[:-1], x[1:]
-    return np.asarray(rows[0] * near[:, 0] + rows[1] * near[:, 1] + rows[2] * far[:, 0] + rows[3] * far[:, 1])
+    return np.asarray(np.einsum("imn,in->mn", rows, np.concatenate([x[:-1].T, x[1:].T])))
 
 
 def _scattered(rows: Array, factors: Array) -> Array:
@@ -211,13 +210,8 @@ def _scattered(rows: Array, factors: Array) -> Array:
 
 
 def _squares(rows: Array, factors: Array) -> Array:
-    """Return the sum over rows of factor g g^T for each interval, shape (4, 4, N)."""
-    result = np.empty((4, 4, factors.shape[1]))
-    for i in range(4):
-        weighed = rows[i] * factors
-        for j in range(i, 4):
-            result[i, j] = result[j, i] = np.einsum("mn,mn->n", weighed, rows[j])
-    return result
+    """Return the sum over rows of factor g g^T for each interval, shape (N, 4, 4)."""
+    return np.asarray((rows * factors).transpose(2, 0, 1) @ rows.transpose(2, 1, 0))
 
 
 def _reach(values: Array, steps: Array, share: float) -> float:
