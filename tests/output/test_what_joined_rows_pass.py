@@ -100,7 +100,7 @@ def shares(plan: Any, rows: JoinedRows, stated: int) -> dict[tuple[str, str | No
 @pytest.mark.parametrize("tools", [0, 1, 2])
 @pytest.mark.parametrize("kind", ["uniform", "listed"])
 @pytest.mark.parametrize("stated", [1, 2, 3])
-@pytest.mark.parametrize("seed", few(range(20), 4))
+@pytest.mark.parametrize("seed", few(range(20), 2))
 def test_each_limit_that_the_joined_curve_passes_is_found_in_each_move(
     seed: int, stated: int, kind: str, tools: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from planning.test_flown_cells import tool_poses
 from ruckig import InputParameter, Result, Ruckig, Trajectory
+from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.planners.flying_by import flown_parts
@@ -83,7 +84,7 @@ def states_at(motion: Trajectory, times: list[float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("parts", [(0.003, 0.7), (0.2, 0.999), (0.001, 0.9995), (0.3, 0.6)])
-@pytest.mark.parametrize("tempo", [1.0, 0.8])
+@pytest.mark.parametrize("tempo", few([0.8, 1.0], 1))
 def test_between_states_of_a_motion_that_keeps_its_limits_one_as_fast_is_found(parts, tempo):
     """Also between those next to rest: there a law of sd^2 by s has a pole in its jerk."""
     course = course_of(SHORT, "{speed: 0.5, acceleration: 1.1}")
