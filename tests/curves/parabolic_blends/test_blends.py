@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
-from trajcli.curves.parabolic_blends.blends import Shrunk, blended
+from trajcli.curves.parabolic_blends.blends import Shrunk, blended, blended_by_acceleration
 
 ENDS = st.sampled_from(["centred", "inside"])
 
@@ -145,6 +145,32 @@ def test_two_equal_points_are_a_rest():
 def test_wrong_input_is_refused(t, q, d, message):
     with pytest.raises(ValueError, match=message):
         blended(t, q, d)
+
+
+@pytest.mark.parametrize(
+    ("t", "q", "fields", "message"),
+    [
+        ([[0], [1]], [[0.0], [1.0]], {}, "do not fit"),
+        ([0, 1], [0.0, 1.0], {}, "do not fit"),
+        ([0, 1], [[[0.0]], [[1.0]]], {}, "do not fit"),
+        ([0, np.nan], [[0.0], [1.0]], {}, "times, positions and velocities must be finite"),
+        ([0, np.inf], [[0.0], [1.0]], {}, "times, positions and velocities must be finite"),
+        ([0, 1], [[0.0], [np.inf]], {}, "times, positions and velocities must be finite"),
+        (
+            [0, 1],
+            [[0.0], [1.0]],
+            {"start_velocity": np.nan},
+            "times, positions and velocities must be finite",
+        ),
+        ([0, 1], [[0.0], [1.0]], {"end_velocity": np.inf}, "times, positions and velocities must be finite"),
+        ([0, 2, 1, 0.5], [[0.0], [1.0], [2.0], [3.0]], {}, "point 2 at 1 s follows 2 s"),
+    ],
+)
+def test_waypoints_that_are_none_are_refused(t, q, fields, message):
+    with pytest.raises(ValueError, match=message):
+        blended(t, q, 0.1, **fields)
+    with pytest.raises(ValueError, match=message):
+        blended_by_acceleration(t, q, 9.0, **fields)
 
 
 def test_the_cost_is_linear():
