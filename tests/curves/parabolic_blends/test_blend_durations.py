@@ -194,3 +194,43 @@ def test_inner_points_are_passed_exactly_also_where_blends_are_shrunk(seed):
         corners = np.flatnonzero(result.points == one.point)
         assert one.used < one.asked
         assert np.isclose(result.blends[corners, one.joint], one.used, rtol=1e-12).any()
+
+
+def test_the_least_acceleration_inside_is_enough_and_no_less_is():
+    tried = 0
+    for seed in range(16):
+        rng = np.random.default_rng(seed)
+        m = int(rng.integers(2, 5))
+        t, q, v = np.cumsum(10 ** rng.uniform(-1, 1, m)), rng.normal(size=(m, 1)), rng.normal(size=(2, 1))
+        fields = {"ends": "inside", "start_velocity": v[0], "end_velocity": v[1]}
+        try:
+            blended_by_acceleration(t, q, 0.2, **fields)
+        except BlendAccelerationError as error:
+            least, tried = error.least, tried + 1
+            blended_by_acceleration(t, q, least * (1 - 1e-15), **fields)
+            with pytest.raises(BlendAccelerationError):
+                blended_by_acceleration(t, q, least * (1 - 1e-9), **fields)
+    assert tried > 8
+
+
+def test_a_step_of_velocity_that_is_no_rounding_has_its_blend():
+    result = blended_by_acceleration([0, 1, 2], [[0.0], [1.0], [2.0 + 1e-10]], 0.5)
+    assert result.blends[1, 0] == pytest.approx(2e-10, rel=1e-4)
+    q = np.array([[0.0, 0.0], [1e9, 1e-7], [2e9, 0.0]])  # beside a joint that goes far
+    assert blended_by_acceleration([0, 1, 2], q, [1e10, 1.0]).blends[1, 1] == pytest.approx(2e-7, rel=1e-9)
+
+
+@pytest.mark.parametrize("ends", ["centred", "inside"])
+def test_two_corners_are_five_eighths_of_the_longer_blend_from_their_point(ends):
+    for seed in range(4):
+        t, q = polyline(seed, 5, 2)
+        result = blended_by_acceleration(
+            t, q, 30 * strong(t, q, np.random.default_rng(seed)), ends=ends, exactly=True
+        )
+        assert not result.shrunk
+        for k in (1, 2, 3):
+            before, after = np.flatnonzero(result.points == k)
+            longer = np.maximum(result.blends[before], result.blends[after])
+            own = t[k] + result.shift
+            np.testing.assert_allclose(own - result.times[before], 0.625 * longer, rtol=1e-9, atol=1e-14)
+            np.testing.assert_allclose(result.times[after] - own, 0.625 * longer, rtol=1e-9, atol=1e-14)
