@@ -196,21 +196,36 @@ def test_inner_points_are_passed_exactly_also_where_blends_are_shrunk(seed):
         assert np.isclose(result.blends[corners, one.joint], one.used, rtol=1e-12).any()
 
 
-def test_the_least_acceleration_inside_is_enough_and_no_less_is():
-    tried = 0
-    for seed in range(16):
+def test_at_the_least_acceleration_inside_the_blend_fills_its_segment():
+    """And with half as much again, both end segments begin and end as asked, at just that acceleration."""
+    tried = set()
+    for seed in range(24):
         rng = np.random.default_rng(seed)
         m = int(rng.integers(2, 5))
         t, q, v = np.cumsum(10 ** rng.uniform(-1, 1, m)), rng.normal(size=(m, 1)), rng.normal(size=(2, 1))
         fields = {"ends": "inside", "start_velocity": v[0], "end_velocity": v[1]}
-        try:
-            blended_by_acceleration(t, q, 0.2, **fields)
-        except BlendAccelerationError as error:
-            least, tried = error.least, tried + 1
-            blended_by_acceleration(t, q, least * (1 - 1e-15), **fields)
-            with pytest.raises(BlendAccelerationError):
-                blended_by_acceleration(t, q, least * (1 - 1e-9), **fields)
-    assert tried > 8
+        with pytest.raises(BlendAccelerationError) as caught:
+            blended_by_acceleration(t, q, 1e-3, **fields)
+        least, end = caught.value.least, 0 if caught.value.point == 0 else -1
+        tried.add((m > 2, end))
+        full = blended_by_acceleration(t, q, least * (1 - 1e-15), **fields)
+        asked = full.blends[:, 0].copy()
+        for one in full.shrunk:  # to leave room for that of the next point
+            asked[one.point] = one.asked
+        filled = asked.sum() if m == 2 else asked[end]
+        assert filled == pytest.approx(np.diff(t)[end], rel=1e-6)
+        with pytest.raises(BlendAccelerationError):
+            blended_by_acceleration(t, q, least * (1 - 1e-9), **fields)
+        result = blended_by_acceleration(t, q, least * 1.5, **fields)
+        curve, shrunk = result.curve, result.shrunk
+        for order, wanted in ((0, q[[0, -1]]), (1, v)):
+            ends = [side[k] for side, k in zip(curve.piece_ends(order), (0, -1), strict=True)]
+            np.testing.assert_allclose(ends, wanted, rtol=0, atol=1e-9)
+        for point, piece in ((0, 0), (m - 1, -1)):
+            if point not in {one.point for one in shrunk}:
+                rate = abs(curve.piece_ends(2)[0][piece, 0])
+                assert rate == pytest.approx(least * 1.5, rel=1e-6)
+    assert tried == {(False, 0), (True, 0), (True, -1)}
 
 
 def test_a_step_of_velocity_that_is_no_rounding_has_its_blend():
