@@ -116,6 +116,8 @@ def two(axis: list[float], point: list[float], slides: bool = False) -> DhTable:
         ),  # d is left to the next row
         ([0, 0, -1], [0.3, 0.4, 0.7], False, (np.arctan2(4, 3), 0.0, 0.5, np.pi, 0.0)),
         ([0, 0, 1], [0.0, 0.0, 0.7], False, (0.0, 0.0, 0.0, 0.0, 0.0)),
+        ([0, 0, 1], [0.0, 1e-16, 0.7], False, (0.0, 0.0, 0.0, 0.0, 0.0)),
+        ([1e-4, 0, 1], [0.0, 1e-16, 0.0], False, (0.0, 0.0, 0.0, 0.0, np.arctan(1e-4))),
         ([0, 0, 1], [0.3, 0.4, 0.7], True, (0.0, 0.0, 0.0, 0.0, 0.0)),  # a slide has no line of its own
         ([0, -1, 0], [0.5, 0.2, 0.7], False, (0.0, 0.7, 0.5, np.pi / 2, 0.0)),
         ([0, 1, 0], [0.5, 0.2, 0.7], False, (0.0, 0.7, 0.5, -np.pi / 2, 0.0)),

@@ -158,7 +158,7 @@ def _last_row(end: Array) -> tuple[float, float, float, float, float]:
 def _right(angle: float) -> float:
     """Return an angle, as a whole number of right angles where it is one but for rounding."""
     whole = round(angle / (pi / 2)) * (pi / 2)
-    return whole + 0.0 if abs(angle - whole) <= _ROUNDING else angle
+    return whole if abs(angle - whole) <= _ROUNDING else angle
 
 
 def _small(length: float) -> float:

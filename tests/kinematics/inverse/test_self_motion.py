@@ -150,6 +150,8 @@ def test_what_is_left_of_the_way_to_the_nearest_point_is_across_the_self_motion_
     positions = forward(robot, q)[:, :3, 3]
     ends = nearest_on_self_motions(robot, partial_target(positions), q, near)
     np.testing.assert_allclose(forward(robot, ends)[:, :3, 3], positions, rtol=0, atol=1e-9)
+    turned = nearest_on_self_motions(robot, partial_target(positions), q + FULL, near)
+    np.testing.assert_allclose(turned, ends, rtol=0, atol=1e-6)
     assert (ends >= low).all()
     assert (ends <= high).all()
     held = 0
