@@ -196,3 +196,12 @@ def test_each_row_stays_where_it_is_allowed_and_others_go_on() -> None:
     assert (came <= 1e-12).all()
     assert (came < -1e-4).any()
     np.testing.assert_allclose(forward(robot, found)[:, :3, 3], target.poses[:, :3, 3], rtol=0, atol=1e-10)
+
+
+def test_what_does_not_meet_its_target_stays_where_it_is() -> None:
+    robot = arm("planar 3R")
+    q = np.array([[0.4, 0.5, 0.6], [0.4, 0.5, 0.6]])
+    target = partial_target(forward(robot, q)[:, :3, 3] + [[9.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    found = nearest_on_self_motions(robot, target, q, q + 0.2)
+    assert found[0].tolist() == q[0].tolist()
+    assert np.abs(found[1] - q[1]).max() > 1e-2
