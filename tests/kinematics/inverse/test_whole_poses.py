@@ -1,0 +1,168 @@
+"""Whole poses that meet a target which leaves something free, and which posture a configuration has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from inverse_arms import arm, random_joints
+from scipy.spatial.transform import Rotation
+
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.families.choose import method_for
+from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
+from trajcli.kinematics.inverse.partial_targets import SAMPLES, Postures, whole_poses
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.target import partial_target, residuals
+from trajcli.kinematics.robot import Joint, Robot, unlimited
+
+H = np.pi / 2
+
+
+def scorbot(rng: np.random.Generator) -> Robot:
+    """Return an arm of five joints whose tcp is on axis 5."""
+    rows = [(0, 0.36, 0.02, H), (0, 0, 0.22, 0), (0, 0, 0.22, 0), (0, 0, 0, H), (0, 0.15, 0, 0)]
+    joints = tuple(Joint(f"j{i}", "revolute", *row) for i, row in enumerate(rows))
+    base, tool = np.eye(4), np.eye(4)
+    base[:3, :3], base[:3, 3] = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3) * 0.1
+    tool[2, 3] = 0.07
+    return Robot("scorbot", joints, unlimited(5), "standard", base, tool)
+
+
+def case(name: str, kind: str | None, axis: str, anyhow: bool, count: int = 4):
+    """Return an arm, joint values, and the targets that these meet."""
+    rng = np.random.default_rng(7)
+    robot = scorbot(rng) if name == "scorbot" else arm(name, rng if anyhow else None)
+    q = random_joints(robot, rng, count)
+    poses = forward(robot, q)
+    tool = poses[:, :3, "xyz".index(axis)]
+    part = {
+        None: {},
+        "direction": {"direction": tool},
+        "yaw": {"yaw": np.arctan2(tool[:, 1], tool[:, 0])},
+        "pitch": {"pitch": np.arctan2(tool[:, 2], np.hypot(tool[:, 0], tool[:, 1]))},
+    }[kind]
+    return robot, q, partial_target(poses[:, :3, 3], tool_axis=axis, **part)
+
+
+CASES = [
+    # arm, what is fixed beside the position, of which axis, base and tool anyhow; then flips, samples, joints free alone
+    ("planar 3R", None, "x", True, 1, SAMPLES, []),
+    ("planar 3R", "yaw", "x", False, 1, 1, []),
+    ("planar 3R", "direction", "y", True, 1, 1, []),
+    ("planar 3R", "pitch", "x", True, 2, 1, []),
+    ("planar 3R", "pitch", "x", False, 1, SAMPLES, []),  # level wherever the arm is
+    ("planar 3R", "direction", "z", False, 1, SAMPLES, []),  # which no joint turns
+    ("SCARA", None, "x", True, 1, SAMPLES, []),
+    ("SCARA", "direction", "x", True, 1, 1, []),
+    ("elbow and pitch", None, "x", True, 1, SAMPLES, []),
+    ("elbow and pitch", "pitch", "x", True, 2, 1, []),
+    ("elbow and pitch", "direction", "y", True, 1, 1, []),
+    ("elbow, pitch and roll", None, "x", True, 1, SAMPLES, []),
+    ("elbow, pitch and roll", "pitch", "x", True, 2, SAMPLES, []),
+    ("scorbot", "direction", "x", True, 2, 1, []),
+    ("scorbot", "direction", "z", True, 1, 1, [4]),
+    ("scorbot", "pitch", "z", True, 2, 1, [4]),
+    ("scorbot", None, "z", True, 1, SAMPLES, [4]),
+    ("UR", "direction", "z", True, 1, SAMPLES, []),
+]
+
+
+@pytest.mark.parametrize(("name", "kind", "axis", "anyhow", "flips", "samples", "alone"), CASES)
+def test_where_the_arm_stands_is_among_the_poses_that_meet_its_own_target(
+    name, kind, axis, anyhow, flips, samples, alone
+) -> None:
+    """The first sample is that of the given configuration; all have the position, and one turn for each shoulder."""
+    robot, q, target = case(name, kind, axis, anyhow)
+    geometry = axis_geometry(robot)
+    found = whole_poses(robot, geometry, target, q)
+    assert found is not None
+    assert (found.flips, found.poses.shape[2]) == (flips, samples)
+    assert np.flatnonzero(found.free).tolist() == alone
+    first = found.poses[:, :, 0]
+    gaps = np.abs(first - forward(robot, q)).max(axis=(-2, -1)).reshape(-1, len(q))
+    assert gaps.min(axis=0).max() < 1e-9
+    np.testing.assert_allclose(
+        found.poses[..., :3, 3],
+        np.broadcast_to(target.poses[:, :3, 3], (*found.poses.shape[:-2], 3)),
+        atol=1e-12,
+    )
+    turns = found.poses[..., :3, :3]
+    np.testing.assert_allclose(
+        np.swapaxes(turns, -1, -2) @ turns, np.broadcast_to(np.eye(3), turns.shape), atol=1e-12
+    )
+    slopes = np.stack(
+        [
+            (residuals(target, forward(robot, q + h)) - residuals(target, forward(robot, q - h))) / 2e-6
+            for h in 1e-6 * np.eye(q.shape[1])
+        ],
+        axis=2,
+    )
+    ranks = (np.linalg.svd(slopes, compute_uv=False) > 1e-6).sum(axis=1)
+    assert found.freedom == q.shape[1] - ranks.max()
+    assert not found.degenerate.any()
+    if found.shoulder is not None:
+        np.testing.assert_allclose(np.hypot(*found.shoulder), 1.0, rtol=0, atol=1e-12)
+        own = np.cos(q[:, 0]) * found.shoulder[0, :, 0] + np.sin(q[:, 0]) * found.shoulder[1, :, 0]
+        assert (own.max(axis=0) > 1.0 - 1e-9).all()
+
+
+@pytest.mark.parametrize("name", ["planar 3R", "elbow and pitch", "SCARA"])
+def test_samples_of_a_sum_of_turns_are_spread_evenly(name: str) -> None:
+    robot, q, target = case(name, None, "x", True)
+    found = whole_poses(robot, axis_geometry(robot), target, q)
+    assert found is not None
+    turns = found.poses[0, 0, :, :, :3, :3]
+    steps = np.swapaxes(turns[:-1], -1, -2) @ turns[1:]
+    angles = Rotation.from_matrix(steps.reshape(-1, 3, 3)).magnitude()
+    np.testing.assert_allclose(angles, 2 * np.pi / SAMPLES, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "axis"),
+    [
+        ("elbow, pitch and roll", "direction", "x"),  # whose roll moves the tcp
+        ("elbow and pitch", "yaw", "x"),  # about axes that are not upright
+        ("scorbot", "yaw", "z"),
+    ],
+)
+def test_where_orientation_and_position_are_coupled_there_is_no_model(
+    name: str, kind: str, axis: str
+) -> None:
+    robot, q, target = case(name, kind, axis, True)
+    assert whole_poses(robot, axis_geometry(robot), target, q) is None
+
+
+def test_a_coordinate_that_is_free_leaves_no_model_but_to_six_joints() -> None:
+    for name, modelled in (("elbow and pitch", False), ("UR", True)):
+        robot, q, target = case(name, "direction", "x", True)
+        some = partial_target(
+            target.poses[:, :3, 3], fixed=(True, False, True), direction=target.aims, tool_axis="x"
+        )
+        assert (whole_poses(robot, axis_geometry(robot), some, q) is not None) == modelled
+    robot, q, _ = case("elbow and pitch", None, "x", True)
+    poses = forward(robot, q)
+    turned = partial_target(poses[:, :3, 3], rotation=poses[:, :3, :3], fixed=(True, True, True))
+    assert whole_poses(robot, axis_geometry(robot), turned, q) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "axis", "flips"),
+    [
+        ("planar 3R", "pitch", "x", 2),
+        ("elbow and pitch", "pitch", "x", 2),
+        ("elbow, pitch and roll", "pitch", "x", 2),
+        ("UR", "direction", "z", 1),
+    ],
+)
+def test_a_posture_is_the_branch_by_which_an_answer_is_called(name, kind, axis, flips) -> None:
+    """Also where joints are full turns further."""
+    robot, q, target = case(name, kind, axis, True, 3)
+    found = solve(robot, target, q)
+    postures = Postures(robot, axis_geometry(robot), method_for(robot), flips, axis)
+    rows, branches = np.nonzero(found.valid)
+    joints = found.joints[rows, branches]
+    assert len(set(branches.tolist())) > 2
+    np.testing.assert_array_equal(postures.of(joints), branches)
+    np.testing.assert_array_equal(
+        postures.of(joints + 2 * np.pi * (np.arange(joints.shape[1]) == 1)), branches
+    )
