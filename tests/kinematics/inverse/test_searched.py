@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from inverse_arms import arm, random_joints
@@ -12,7 +14,7 @@ from trajcli.kinematics.inverse import held_joint, searched
 from trajcli.kinematics.inverse.answers import Answers, closures
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.numeric import SearchResult
-from trajcli.kinematics.inverse.searched import by_held_joint, by_search
+from trajcli.kinematics.inverse.searched import by_held_joint, by_search, resolve_suspects
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import IkTarget, partial_target, pose_target
 
@@ -30,27 +32,29 @@ def test_each_answer_is_kept_once_those_inside_the_limits_first_and_the_nearest_
 ) -> None:
     """By the largest difference of any joint. Seeds lead to the same answer in other turns, and not quite to it."""
     rng = np.random.default_rng(3)
-    robot = arm("UR", rng, [[-2.7, 2.7]] * 6)
+    robot = arm("UR", rng, [[-2.7, 2.7]] * 3 + [[-9.0, 9.0]] * 3)
     q = random_joints(robot, rng, 20)
     q = q[solve(robot, forward(robot, q)).valid.all(axis=1)][:3]
+    q[2, 2] = 3e-3  # two answers beside each other, almost stretched
     target = pose_target(forward(robot, q))
     every = solve(robot, target)
     joints = np.concatenate(
-        [every.joints, every.joints + FULL, every.joints + 4e-6, every.joints + 0.1], axis=1
+        [every.joints - FULL, every.joints + FULL, every.joints + 4e-6 + FULL, every.joints + 0.1], axis=1
     )
     met = np.tile(np.arange(32) < 24, (3, 1))
     met[:, 30] = True  # a seed that is said to have met, and has not
     met[1, [2, 10, 18]] = False
     order = rng.permutation(32)
     found_by(monkeypatch, joints[:, order], met[:, order])
-    near = q + 0.3 * rng.normal(size=q.shape) if given else None
+    turns = FULL * np.array([0.0, 0.0, 0.0, 1.0, -1.0, 1.0])
+    near = q + turns + 0.3 * rng.normal(size=q.shape) if given else None
     answers = by_search(robot, method_for(robot), target, near, 1e-4)
     aim = np.zeros(q.shape) if near is None else near
     turned = solve(robot, target, near)
     mixed = 0
     for row in range(3):
         values = answers.joints[:, answers.valid[:, row], row].T
-        missing = [2] if row == 1 else []
+        missing = ~every.valid[row] | ((row == 1) & (np.arange(8) == 2))
         wanted = np.delete(turned.joints[row], missing, axis=0)
         inside = np.delete(turned.within_limits[row], missing)
         gaps = np.abs(values[:, None] - wanted).max(axis=2)
@@ -63,6 +67,7 @@ def test_each_answer_is_kept_once_those_inside_the_limits_first_and_the_nearest_
             assert (np.diff(group) >= -1e-12).all()
         mixed += 0 < inside.sum() < len(inside)
     assert mixed >= 2
+    assert answers.valid.sum(axis=0).tolist() == [8, 7, every.count[2]]
     np.testing.assert_allclose(answers.closure, closures(robot, target, answers.joints), rtol=0, atol=1e-9)
     assert answers.suspect.all()
     assert (answers.freedom, answers.closed_form) == (0, False)
@@ -93,6 +98,17 @@ def test_points_of_a_self_motion_become_its_nearest_and_are_ordered_by_the_sum_o
     for row in range(2):
         own = answers.joints[:, answers.valid[:, row], row].T
         assert all(np.abs(a - b).max() > 1e-3 for k, a in enumerate(own) for b in own[:k])
+
+
+def test_where_no_seed_has_met_the_nearest_of_them_is_told(monkeypatch) -> None:
+    robot = arm("UR")
+    q = random_joints(robot, np.random.default_rng(6), 2)
+    target = pose_target(forward(robot, q))
+    seeds = q[:, None] + np.array([0.3, 0.02, 0.1])[:, None]
+    found_by(monkeypatch, seeds, np.zeros((2, 3), dtype=bool))
+    answers = by_search(robot, method_for(robot), target, q, 1e-9)
+    assert not answers.valid.any()
+    np.testing.assert_allclose(answers.joints[:, 0].T, q + 0.02, rtol=0, atol=1e-12)
 
 
 def plain(robot, joints: np.ndarray, valid: np.ndarray, target: IkTarget) -> Answers:
@@ -163,3 +179,32 @@ def test_a_target_that_leaves_something_free_is_searched_for_and_says_why(monkey
     assert (method.family, near, tolerance) == ("numeric", None, 1e-9)
     assert "fixes 5 coordinates" in method.reason
     assert same is target
+
+
+def test_a_suspect_pose_all_of_whose_branches_are_lost_is_met_from_where_the_arm_is() -> None:
+    robot = arm("UR", np.random.default_rng(7))
+    q = random_joints(robot, np.random.default_rng(8), 3)
+    q[2, 4] = 0.0  # and what is found may be singular itself
+    target = pose_target(forward(robot, q))
+    joints = np.tile((q + 0.4).T[:, None], (1, 8, 1))
+    answers = plain(robot, joints, np.zeros((8, 3), dtype=bool), target)
+    answers = replace(answers, closed_form=True, freedom=0, suspect=np.array([False, True, True]))
+    singular, free = resolve_suspects(robot, target, answers, q, 1e-9)
+    assert answers.valid.any(axis=0).tolist() == [False, True, True]
+    for row in (1, 2):
+        own = answers.joints[:, answers.valid[:, row], row].T
+        assert np.abs(own - q[row]).max(axis=1).min() < 1e-8
+    np.testing.assert_allclose(answers.closure, closures(robot, target, answers.joints), rtol=0, atol=1e-12)
+    assert singular.any(axis=0).tolist() == [False, False, True]
+    assert free.any(axis=(0, 1)).tolist() == [False, False, True]
+
+
+@pytest.mark.parametrize("name", ["UR", "wrist over elbow"])
+def test_what_is_singular_is_an_answer(name: str) -> None:
+    robot = arm(name, np.random.default_rng(7))
+    q = random_joints(robot, np.random.default_rng(8), 6)
+    q[:, 4] = 0.0
+    found = solve(robot, forward(robot, q), q)
+    assert found.singular.any(axis=1).all()
+    assert not (found.singular & ~found.valid).any()
+    assert not (found.free & ~found.valid[..., None]).any()

@@ -183,7 +183,8 @@ def resolve_suspects(
         valid = one_per_self_motion(robot, joints, valid, some_free, nearby)
     choose_turns(robot, joints.transpose(2, 1, 0), None if nearby is None else nearby.T)
     answers.joints[:, :, suspects], answers.valid[:, suspects] = joints.transpose(2, 1, 0), valid.T
-    singular[:, suspects], free[:, :, suspects] = (some_singular & valid).T, some_free.transpose(2, 1, 0)
+    singular[:, suspects] = (some_singular & valid).T
+    free[:, :, suspects] = (some_free & valid[..., None]).transpose(2, 1, 0)
     return singular, free
 
 
