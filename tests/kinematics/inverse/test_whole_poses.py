@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from inverse_arms import arm, random_joints
@@ -13,6 +15,7 @@ from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.partial_targets import SAMPLES, Postures, whole_poses
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import partial_target, residuals
+from trajcli.kinematics.inverse.tool_axis import always_vertical, fixed_axis
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 
 H = np.pi / 2
@@ -166,3 +169,64 @@ def test_a_posture_is_the_branch_by_which_an_answer_is_called(name, kind, axis, 
     np.testing.assert_array_equal(
         postures.of(joints + 2 * np.pi * (np.arange(joints.shape[1]) == 1)), branches
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "axis"),
+    [
+        ("planar 3R", "pitch", "x"),
+        ("elbow and pitch", "pitch", "x"),
+        ("elbow and pitch", "direction", "x"),
+        ("scorbot", "direction", "x"),
+        ("scorbot", "pitch", "z"),
+    ],
+)
+@pytest.mark.parametrize("turned", [[0, 2], [1, 3], [0, 1, 2, 3, 4], [4]])
+def test_which_way_joints_count_does_not_change_what_an_answer_is_called(name, kind, axis, turned) -> None:
+    robot, q, target = case(name, kind, axis, True, 3)
+    signs = np.where(np.isin(np.arange(q.shape[1]), turned), -1, 1)
+    joints = tuple(
+        replace(joint, sign=int(sign) * joint.sign) for joint, sign in zip(robot.joints, signs, strict=True)
+    )
+    other = replace(robot, joints=joints)
+    one, two = solve(robot, target, q), solve(other, target, signs * q)
+    assert one.names == two.names
+    np.testing.assert_array_equal(one.valid, two.valid)
+    np.testing.assert_allclose(one.joints[one.valid], signs * two.joints[two.valid], rtol=0, atol=1e-6)
+
+
+def test_parallel_axes_that_joint_1_turns_are_upright_only_where_it_stands_so() -> None:
+    """A heading then depends on joint 1, although the axes are vertical at zero."""
+    robot, q, _ = case("elbow and pitch", None, "x", False)
+    axis = axis_geometry(robot).axes[1].direction
+    base = np.eye(4)
+    base[:3, :3] = Rotation.align_vectors([[0.0, 0.0, 1.0]], [axis])[0].as_matrix()
+    robot = replace(robot, base=base)
+    assert np.abs(base[:3, :3] @ axis - [0.0, 0.0, 1.0]).max() < 1e-12
+    target = partial_target(forward(robot, q)[:, :3, 3], yaw=np.zeros(4), tool_axis="x")
+    assert whole_poses(robot, axis_geometry(robot), target, q) is None
+
+
+def test_a_roll_about_the_tool_axis_beside_the_tcp_is_no_joint_that_is_free_alone() -> None:
+    robot = scorbot(np.random.default_rng(7))
+    tool = robot.tool.copy()
+    tool[0, 3] = 0.05
+    robot = replace(robot, tool=tool)
+    q = random_joints(robot, np.random.default_rng(8), 3)
+    found = whole_poses(robot, axis_geometry(robot), partial_target(forward(robot, q)[:, :3, 3]), q)
+    assert found is not None
+    assert (found.freedom, found.free.any()) == (2, False)
+    gaps = np.abs(found.poses[:, :, 0] - forward(robot, q)).max(axis=(-2, -1)).reshape(-1, 3)
+    assert gaps.min(axis=0).max() < 1e-9
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-4])
+def test_an_axis_is_vertical_within_rounding(tilt: float) -> None:
+    """The tool axis that no joint of a SCARA turns has a heading as soon as its base leans."""
+    robot = arm("SCARA")
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_euler("y", tilt).as_matrix()
+    geometry = axis_geometry(replace(robot, base=base))
+    assert always_vertical(geometry, "z") == (tilt == 0.0)
+    assert fixed_axis(geometry, "z")
+    assert not fixed_axis(geometry, "x")
