@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.curves.phases import PhaseChain
+from trajcli.curves.phases import PhaseChain, merged_curve
 
 
 def integrate(initial, durations, constants):
@@ -123,3 +123,68 @@ def test_motion_without_phases_is_a_point():
     curve = chain.curve(3.0, 0.0)
     assert curve.duration == 0
     assert curve.evaluate(0.0)[0] == 3.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_peaks_are_of_either_sign_and_of_the_target(sign):
+    chain = chain_of([0.0, sign * 2.0], [sign * -9.0, 0.0], [1.0, 4.0], [sign * -1.0, sign * -1.0])
+    assert chain.states == [[0, sign * 2.0], [sign * 1.5, sign * 1.0], [sign * -2.5, sign * -3.0]]
+    assert chain.peaks == (9.0, 3.0)
+    assert chain.coarseness == 0.0
+    # the position counts against the peak velocity times the duration where that is more
+    far = chain_of([0.0, sign * 2.0], [sign * 4.0, sign * -2.0], [1.0, 3.0], [sign * -1.0, sign * -1.0])
+    assert far.defect() == pytest.approx(4.0 / 8.0)
+    assert far.defect(5.0) == pytest.approx(0.5)
+    assert far.defect(2.0) == pytest.approx(1.0)
+
+
+def test_coarseness_is_what_a_rounded_break_does_to_the_velocity():
+    chain = chain_of(np.zeros(3), [2.0, 0.0, 0.0], [1.0, 2.0, 1.0], [1.0, -1.0, 1.0])
+    assert chain.peaks == (2.0, 0.5, 1.0)  # at the ends of phases
+    assert chain.coarseness == 2 * np.spacing(4.0)
+    assert chain_of(np.zeros(3), np.zeros(3), [1.0], [0.0]).coarseness == 0.0
+    assert chain_of(np.zeros(3), np.zeros(3), [1.0], [0.0]).defect() == 0.0
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("longest", [1.0, 1e4])
+def test_a_curve_ends_in_its_target_to_the_last_bits(order, longest):
+    """Whatever rounding of its breaks does: relative to its peaks, of the position to velocity times duration."""
+    for seed in range(20):
+        chain = random_chain(np.random.default_rng(seed), order, 6)
+        durations = np.array(chain.durations) * np.where(np.arange(6) == 3, longest, 1.0)
+        final = integrate(chain.initial, durations, chain.constants)
+        chain = replace(chain, durations=tuple(durations.tolist()), final=tuple(final.tolist())).polished()[0]
+        curve = chain.curve(0.3, chain.duration)
+        ends = np.array([curve.piece_ends(k)[1][-1, 0] for k in range(order)]) - np.eye(order)[0] * 0.3
+        sizes = np.array(chain.peaks)
+        sizes[:-1] = np.maximum(sizes[:-1], sizes[1:] * chain.duration)
+        assert (np.abs(ends - final) <= 3e-15 * sizes).all()
+
+
+def test_a_cruise_is_without_acceleration_but_for_rounding_of_its_peak():
+    """At 1e-6 of the peak a phase without jerk still changes its velocity; at 1e-12 only rounding says so."""
+    for left, cruising in ((1e-6, set()), (-1e-6, set()), (1e-12, {2}), (-1e-12, {2})):
+        jerks = [30.0, -30.0 * (1 - left), 0.0]
+        chain = chain_of(np.zeros(3), [np.nan] * 3, [0.1, 0.1, 5.0], jerks).with_cruises()
+        assert chain.cruising == cruising
+
+
+def test_merged_variables_are_those_of_their_own_curves():
+    """All of one order, of several orders, and one that does not move at all."""
+    rng = np.random.default_rng(4)
+    chains = [random_chain(rng, order, phases) for order, phases in ((3, 5), (3, 2), (2, 4))]
+    still = chain_of([0.0] * 3, [0.0] * 3, [], [])
+    for chosen in (chains[:2], chains[1::-1], chains):
+        duration = max(chain.duration for chain in chosen)
+        lasting = [chain.stretched(duration) for chain in chosen]
+        curve = merged_curve([(1.0 + k, chain) for k, chain in enumerate(lasting)], duration)
+        t = np.linspace(0, duration, 50)
+        for k, chain in enumerate(lasting):
+            own = chain.curve(1.0 + k, duration)
+            for order in range(3):
+                np.testing.assert_allclose(
+                    curve.evaluate(t, order)[:, k], own.evaluate(t, order)[:, 0], rtol=0, atol=1e-12
+                )
+    both = merged_curve([(1.0, still), (2.0, still)], 0.0)
+    np.testing.assert_array_equal(both.evaluate(np.zeros(1)), [[1.0, 2.0]])
