@@ -145,13 +145,13 @@ def plain_names(
     """
     if not 2 <= len(shape) <= 3 or shape[-1] < 1 + timed or min(shape) < 1:
         raise InputError(f"{file}: an array of shape {tuple(shape)} is no table of rows", hint=_LAYOUT)
-    rest = shape[-1] - timed
-    count = rest if joints is None else joints
-    if rest % count or rest // count > len(_ORDERS):
+    columns = shape[-1] - timed
+    count = columns if joints is None else joints
+    if columns % count or columns // count > len(_ORDERS):
         lacks = timed and shape[-1] == count
         time = "; it seems to lack the time, which --rate says" if lacks else ""
         raise InputError(f"{file}: {shape[-1]} columns for {count} joints{time}", hint=_LAYOUT)
-    names = [f"{kind}{joint + 1}" for kind in _ORDERS[: rest // count] for joint in range(count)]
+    names = [f"{kind}{joint + 1}" for kind in _ORDERS[: columns // count] for joint in range(count)]
     said = ["t"] * timed
     note = f"columns are read as {', '.join([*said, f'{names[0]} .. {names[-1]}'])}"
     return [*said, *names], [note, *_note_on_chunks(shape[:-1])]
@@ -194,8 +194,8 @@ def open_archive(source: ByteSource, joints: int | None = None, *, timed: bool =
         found = _names_of(name, array.shape[len(rows) :])
         names, shares = [*names, *found], [*shares, *[share_of(array.dtype)] * len(found)]
         parts.append(array.reshape(int(np.prod(rows)), -1).astype(np.float64))
-    rest = [name for name in arrays if name not in taken]
-    notes = [f"arrays that are not read: {', '.join(rest)}"] if rest else []
+    unread = [name for name in arrays if name not in taken]
+    notes = [f"arrays that are not read: {', '.join(unread)}"] if unread else []
     joined = np.concatenate(parts, axis=1)
     return _rows_of(source.file, "fields", names, joined, shares, [*notes, *_note_on_chunks(rows)])
 

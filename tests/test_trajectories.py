@@ -1,0 +1,125 @@
+"""Trajectories as callers see them: times, orders, moves and the tools that they have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.errors import InputError
+from trajcli.kinematics.robot import Joint, MountedTool, Payload, Robot, unlimited
+from trajcli.trajectory import Signal, SignalChange, Span, State, Trajectory, ViaPoints, move_title, resting
+
+# q = t^2 up to 1 s, then 1 + 3 (t - 1) + ...: velocity steps from 2 to 3
+CURVE = PiecewisePolynomial(
+    np.array([0.0, 1.0, 3.0]), np.array([[[1.0], [0.5]], [[0.0], [3.0]], [[0.0], [1.0]]])
+)
+ARM = Robot("arm", (Joint("a", a=1.0),), unlimited(1), "standard", np.eye(4), np.eye(4))
+
+
+def made(*spans: Span, start_time: float = 0.0) -> Trajectory:
+    every = spans or (Span(0, "quintic", 0.0, 1.0, 1), Span(1, "line", 1.0, 3.0, 1))
+    state = resting(np.zeros(1))
+    return Trajectory(CURVE, ("a",), ("revolute",), every, state, state, start_time=start_time)
+
+
+def test_rest_is_without_velocity_and_acceleration() -> None:
+    for velocity, acceleration, rests in ((0.0, 0.0, True), (1.0, 0.0, False), (0.0, 1.0, False)):
+        assert State(np.ones(1), np.array([velocity]), np.array([acceleration])).at_rest == rests
+
+
+def test_points_of_a_slower_motion_are_passed_later() -> None:
+    points = ViaPoints(np.array([0.0, 1.0]), np.ones((2, 1)), np.zeros((2, 1))).scaled(2.5)
+    assert points.times.tolist() == [0.0, 2.5]
+
+
+@pytest.mark.parametrize("start", [0.0, 7.0, -4.0])
+def test_calls_count_from_the_time_of_the_start_and_end_within_rounding(start: float) -> None:
+    trajectory = made(start_time=start)
+    grid = np.array([[0.0, 0.5], [1.0 - 5e-13, 3.0]])
+    positions = trajectory(start + grid)
+    assert positions.shape == (2, 2, 1)
+    np.testing.assert_allclose(positions[..., 0], [[0, 0.25], [1, 9]], atol=1e-9)
+    assert trajectory(start + 1.0 - 5e-13, 1) == pytest.approx(3.0)  # at a break the later piece
+    assert trajectory(start - 5e-10).tolist() == [0.0]
+    assert trajectory(start + 3 + 5e-10) == pytest.approx(9.0)
+    for late in (-2e-9, 3 + 2e-9, np.nan):
+        with pytest.raises(InputError, match="outside the trajectory"):
+            trajectory(start + late)
+    for order in (True, -1, 1.0):
+        with pytest.raises(InputError, match="the order of the derivative"):
+            trajectory(start, order)  # type: ignore[arg-type]
+    rows = trajectory.sample(1.0)
+    assert rows.t.tolist() == [start, start + 1, start + 2, start + 3]
+    assert rows.qd[:, 0].tolist() == [0, 3, 4, 5]
+
+
+def test_before_a_break_the_earlier_piece_counts() -> None:
+    trajectory = made()
+    times = np.array([1.0, 1.0 + 2e-16, 0.5, 3.0, 3.5])
+    np.testing.assert_allclose(trajectory.before(times, 1)[:, 0], [2, 2, 1, 5, 5], atol=1e-12)
+
+
+def test_a_move_of_no_length_holds_no_time() -> None:
+    still = [Span(k, "detach", time, time, 1, handles=True) for k, time in ((1, 1.0), (3, 3.0))]
+    spans = (Span(0, "a", 0.0, 1.0, 1), still[0], Span(2, "c", 1.0, 3.0, 1), still[1])
+    trajectory = made(*spans)
+    assert [trajectory.span_at(time).index for time in (0.0, 0.9, 1.0, 3.0)] == [0, 0, 2, 2]
+    assert repr(trajectory) == "Trajectory(1 joint, 2 moves, 3 s)"
+
+
+@pytest.mark.parametrize(
+    ("ends", "origin", "goal"),
+    [("pick -> place", "pick", "place"), ("a -> b -> c", "a", "c"), ("-> place", "", "place"), ("", "", "")],
+)
+def test_names_of_a_move(ends: str, origin: str, goal: str) -> None:
+    span = Span(0, "line", 0.0, 1.0, 1, label="", round="slot 2 of 3", ends=ends)
+    assert (span.origin, span.goal, span.duration) == (origin, goal, 1.0)
+    assert span.title == (f"{ends} (line, slot 2 of 3)" if ends else "line, slot 2 of 3")
+    assert replace(span, label="weld").title == "weld (line, slot 2 of 3)"
+    assert replace(span, label="weld").words == "line, weld, slot 2 of 3"
+    assert move_title("", None, "line", "") == "line"
+
+
+def test_each_time_is_of_the_tool_and_the_payload_that_the_arm_has_then() -> None:
+    """Just before a change the new tool counts; what is asked of tools does not depend on the payload."""
+    long = np.eye(4)
+    long[0, 3] = 0.5
+    load = Payload(2.0, np.zeros(3), np.zeros((3, 3)))
+    tool = MountedTool(long, name="long")
+    spans = (
+        Span(0, "a", 0.0, 1.0, 1, payload=load),
+        Span(1, "tool", 1.0, 1.0, 1, handles=True),
+        Span(2, "b", 1.0, 3.0, 1, tool=tool),
+    )
+    times = np.array([2.0, 0.5, 1.0 - 5e-13, 3.0])
+    asked: list[tuple[float, int]] = []
+
+    def values(arm: Robot, rows: np.ndarray) -> np.ndarray:
+        assert arm.payload is None
+        asked.extend((float(arm.tool[0, 3]), row) for row in rows.tolist())
+        return np.full((rows.size, 1), arm.tool[0, 3]) + times[rows, None]
+
+    found = made(*spans).of_tools(ARM, times, values)
+    np.testing.assert_allclose(found[:, 0], times + np.array([0.5, 0.0, 0.5, 0.5]))
+    assert sorted(asked) == [(0.0, 1), (0.5, 0), (0.5, 2), (0.5, 3)]
+    arm = spans[0].arm(ARM)
+    assert arm.payload is load
+    assert spans[2].arm(arm).payload is None
+    assert spans[2].arm(ARM).tool[0, 3] == 0.5
+
+
+def test_a_signal_is_zero_until_its_first_change_and_new_from_each_on() -> None:
+    signal = Signal("grip", (SignalChange(1.0, 5.0, 0), SignalChange(2.0, -3.0, 1)))
+    times = np.array([0.0, 1.0 - 1e-9, 1.0 - 5e-13, 1.0, 1.5, 2.0, 9.0])
+    assert signal.values(times).tolist() == [0, 0, 5, 5, 5, -3, -3]
+    assert Signal("never", ()).values(times).tolist() == [0] * 7
+
+
+def test_a_trajectory_of_no_duration_has_the_tool_of_its_first_move() -> None:
+    tool = MountedTool(np.eye(4), name="bare")
+    spans = (Span(0, "a", 0.0, 0.0, 1, tool=tool), Span(1, "b", 0.0, 0.0, 1))
+    found = made(*spans).of_tools(ARM, np.zeros(2), lambda arm, rows: np.full(rows.size, arm is ARM))
+    assert found.tolist() == [0, 0]
