@@ -7,6 +7,17 @@ import pytest
 from trajcli.streams.recorded.column_names import read_name, split_unit
 
 NAMES = {
+    "thetadot_1": ("qd", 1, None, ""),
+    "setpoint_pos_1": ("q", 1, None, "reference"),
+    "q_dot_dot_1": ("qdd", 1, None, ""),
+    "dd_q1": ("qdd", 1, None, ""),
+    "q dot 2": ("qd", 2, None, ""),
+    "position_w": (None, None, None, ""),
+    "move_1": (None, None, None, ""),
+    "q1_2": (None, None, None, ""),
+    "robot_1": (None, None, None, ""),
+    "time_offset": (None, None, None, ""),
+    "position_v_1": ("q", "v_1", None, ""),
     "t": ("t", None, None, ""),
     "Time [ms]": ("t", None, "ms", ""),
     "timestamp_ns": ("t", None, "ns", ""),
@@ -70,3 +81,8 @@ def test_stems_are_what_a_user_writes():
     assert read_name("Axis 3").stem == "Axis"
     assert read_name("joint_1_vel").stem == "joint_*_vel"
     assert read_name("/joint_states/a/position").stem == "/joint_states/*/position"
+
+
+def test_a_unit_stands_behind_a_name() -> None:
+    assert split_unit("q1_ [deg]") == split_unit("q1 (deg)") == ("q1", "deg")
+    assert split_unit("_deg") == ("_deg", None)

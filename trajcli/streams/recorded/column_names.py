@@ -126,11 +126,11 @@ def read_name(text: str) -> ColumnName:
         return ColumnName(text, TIME, None, unit, "", plain)
     if words == [MOVE]:
         return ColumnName(text, MOVE, None, None, "", plain)
-    quantity, rest = _quantity(letters)
-    kind = next((_KINDS[word] for word in rest if word in _KINDS), "")
+    quantity, others = _quantity(letters)
+    kind = next((_KINDS[word] for word in others if word in _KINDS), "")
     numbers = list(re.finditer(r"[0-9]+", plain))
-    if len(numbers) == 1 and all(word in _JOINT_WORDS | _KINDS.keys() | _EMPTY_WORDS for word in rest):
-        quantity = "q" if quantity is None and _JOINT_WORDS & set(rest) else quantity
+    if len(numbers) == 1 and all(word in _JOINT_WORDS | _KINDS.keys() | _EMPTY_WORDS for word in others):
+        quantity = "q" if quantity is None and _JOINT_WORDS & set(others) else quantity
         at = numbers[0]
         ends = not plain[at.end() :].strip(" _.])}")
         stem = plain[: at.start()].rstrip(" _.[({") if ends else f"{plain[: at.start()]}*{plain[at.end() :]}"
@@ -160,8 +160,8 @@ def unit_of(text: str) -> str | None:
     if rate is not None and rate[1].lower() in _UNITS:
         order = rate[2] or ("2" if rate[3] else "3" if rate[4] else "")
         return f"{_UNITS[rate[1].lower()] or rate[1]}/s{'^' + order if order else ''}"
-    known = _UNITS.get(plain.lower())
-    return known or (plain if known is not None else None)
+    usual = _UNITS.get(plain.lower())
+    return usual or (plain if usual is not None else None)
 
 
 def _is_time(words: Sequence[str]) -> bool:
