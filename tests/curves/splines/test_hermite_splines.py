@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import factorial
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
 from scipy.interpolate import BPoly, CubicHermiteSpline
 from spline_laws import SEEDS, assert_through, jump, uneven_times
 
 from trajcli.curves.extrema import peaks
+from trajcli.curves.hermite import hermite_errors
 from trajcli.curves.splines.hermite import (
     computed_accelerations,
     computed_velocities,
@@ -167,3 +170,13 @@ def test_values_that_do_not_fit():
         quintic_through(times, positions, positions, positions + np.nan)
     with pytest.raises(ValueError, match="at the last point must be 2 finite numbers"):
         computed_velocities(times, positions, [0, 0], [0])
+
+
+@pytest.mark.parametrize("stated", [2, 3])
+def test_the_errors_of_a_power_are_those_that_are_stated(stated):
+    """Of x^(2k) over its (2k)! a Hermite polynomial of degree 2k - 1 misses (x (x - h))^k over that: no bound is less."""
+    h, missed = 0.7, Polynomial([0.0, -0.7, 1.0]) ** stated / factorial(2 * stated)
+    for order, bound in enumerate(hermite_errors(np.array(1.0), h, stated).tolist()):
+        derivative = missed.deriv(order) if order else missed
+        inner = [x.real for x in derivative.deriv().roots() if abs(x.imag) < 1e-6 and 0 < x.real < h]
+        assert np.abs(derivative(np.array([0.0, h, *inner]))).max() == pytest.approx(bound, rel=1e-9)
