@@ -10,9 +10,16 @@ from inverse_arms import arm, random_joints
 from scipy.spatial.transform import Rotation
 
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.answers import Answers, closures
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
-from trajcli.kinematics.inverse.partial_targets import SAMPLES, Postures, whole_poses
+from trajcli.kinematics.inverse.partial_targets import (
+    SAMPLES,
+    Postures,
+    _PostureReduction,
+    _without_repetition,
+    whole_poses,
+)
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import partial_target, residuals
 from trajcli.kinematics.inverse.tool_axis import always_vertical, fixed_axis
@@ -230,3 +237,95 @@ def test_an_axis_is_vertical_within_rounding(tilt: float) -> None:
     assert always_vertical(geometry, "z") == (tilt == 0.0)
     assert fixed_axis(geometry, "z")
     assert not fixed_axis(geometry, "x")
+
+
+def reduction(name: str, kind: str | None, axis: str, flips: int, shift: float, limits=None):
+    """Return a reduction to postures for targets of joint values, near to others, and answers that are none yet."""
+    robot, q, target = case(name, kind, axis, True, 3)
+    if limits is not None:
+        robot = replace(robot, limits=replace(robot.limits, position=np.tile(limits, (q.shape[1], 1))))
+    method = method_for(robot)
+    postures = Postures(robot, axis_geometry(robot), method, flips, axis)
+    near = q + shift
+    found = solve(robot, target, near)
+    joints = np.full((q.shape[1], len(found.names), 3), 0.5)
+    answers = Answers(
+        method, joints, closures(robot, target, joints), np.zeros(joints.shape[1:], dtype=bool),
+        np.ones(3, dtype=bool), np.zeros(q.shape[1], dtype=bool), 1, True,
+    )  # fmt: skip
+    return _PostureReduction(postures, target, near, 1e-9), answers, q, found
+
+
+def test_an_offer_is_taken_by_its_posture_where_it_meets_its_target_and_is_nearer() -> None:
+    """In the turns that are nearest; those outside the limits come behind those inside."""
+    own, answers, q, _ = reduction("UR", "direction", "z", 1, 0.05, [-3.5, 3.5])
+    posture = own.postures.of(q)
+    wrong = q.copy()
+    wrong[1] += 1e-3
+    own._offer(answers, np.arange(3), wrong + 2 * np.pi)
+    assert np.argwhere(answers.valid.T).tolist() == [[0, posture[0]], [2, posture[2]]]
+    for row in (0, 2):
+        np.testing.assert_allclose(answers.joints[:, posture[row], row], q[row], rtol=0, atol=1e-12)
+    turned = q[[2]].copy()
+    turned[0, 5] += 0.3  # about the direction: the tool rolls
+    before = answers.joints.copy()
+    own._offer(answers, np.array([2]), turned)
+    np.testing.assert_array_equal(answers.joints, before)  # it is further off
+    answers.joints[:, posture[2], 2] = turned[0]
+    own._offer(answers, np.array([2]), q[[2]])
+    np.testing.assert_allclose(answers.joints[:, posture[2], 2], q[2], rtol=0, atol=1e-12)
+    own._offer(answers, np.arange(0), q[:0])
+
+
+def test_what_is_outside_the_limits_counts_as_far_and_turns_are_chosen_before() -> None:
+    own, _, q, _ = reduction("UR", "direction", "z", 1, 0.1, [-3.5, 3.5])
+    joints = np.stack([q + 2 * np.pi, q], axis=1).transpose(2, 1, 0).copy()
+    joints[0, 1, :2] = 3.51 + np.array([0.0, 0.3])
+    cost = own._cost(joints, np.arange(3))
+    np.testing.assert_allclose(joints[:, 0].T, q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(cost[0], 6 * 0.1**2, rtol=1e-9)
+    inside = (np.abs(joints[:, 1]) <= 3.5).all(axis=0)
+    np.testing.assert_array_equal(cost[1] < 1e3, inside)
+
+
+def test_a_posture_that_no_sample_meets_is_sought_and_a_target_that_none_does_is_searched_for() -> None:
+    """All answers there are come back from starts that are a little off, and from nothing."""
+    own, answers, q, found = reduction("UR", "direction", "z", 1, 0.02)
+    posture = own.postures.of(q)
+    start = (q + 0.01).T
+    answers.joints[:] = start[:, None]
+    own.fill_missing(answers)
+    assert answers.valid.any(axis=0).all()
+    for row in range(3):
+        assert answers.valid[posture[row], row]
+        pose = forward(own.postures.robot, answers.joints[:, posture[row], row])
+        assert answers.valid[:, row].tolist() == solve(own.postures.robot, pose).valid.tolist()
+        own_joints = answers.joints[:, answers.valid[:, row], row].T
+        indices = np.flatnonzero(answers.valid[:, row])
+        assert own.postures.of(own_joints).tolist() == indices.tolist()
+        tool = forward(own.postures.robot, own_joints)
+        np.testing.assert_allclose(
+            tool[:, :3, 2], np.tile(own.target.aims[row], (len(tool), 1)), rtol=0, atol=1e-9
+        )
+    before = answers.joints.copy()
+    own.move_nearest(answers)
+    far, came = (
+        np.square(each - own.near.T[:, None]).sum(axis=0)[answers.valid] for each in (before, answers.joints)
+    )
+    assert (came <= far + 1e-9).all()
+    assert (came < far - 1e-6).any()
+    best = np.where(answers.valid, np.square(answers.joints - own.near.T[:, None]).sum(axis=0), np.inf).min(
+        axis=0
+    )
+    theirs = np.where(found.valid, np.square(found.joints - own.near[:, None]).sum(axis=2), np.inf).min(
+        axis=1
+    )
+    np.testing.assert_allclose(best, theirs, rtol=0, atol=1e-7)
+
+
+def test_indices_that_come_twice_are_taken_one_after_the_other() -> None:
+    rows = np.array([2, 0, 2, 1, 2])
+    parts = [part.tolist() for part in _without_repetition(rows)]
+    assert sorted(index for part in parts for index in part) == list(range(5))
+    assert all(len(set(rows[part])) == len(part) for part in parts)
+    assert len(parts) == 3
