@@ -107,7 +107,7 @@ def _between_ends(outline: _Outline, robot: Robot, duration: float) -> tuple[flo
     bound = fastest_duration(start, end, robot.limits)
     report = bound_report(bound, duration, robot)
     if isinstance(bound, NoBound) or not (start.at_rest and end.at_rest):
-        return None, report  # who is in motion may pass an end that is nearer
+        return None, report
     resolution = outline.first.resolution
     apart = end.position - start.position
     rounding = 2 * resolution.q + resolution.relative[0] * (abs(start.position) + abs(end.position))

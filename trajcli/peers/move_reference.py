@@ -30,7 +30,7 @@ from trajcli.trajectory import Span
 from trajcli.units import joint_units
 
 _MISSED = 1e-12  # rad or m: points that are passed at more are not gone through
-_BELOW = 1e-6  # relative to a bound: at a stop a last bit of the way is worth its root
+_BELOW = 1e-6  # relative: at a stop a last bit counts by its root
 
 
 def reference_of(move: PlannedMove) -> ReferenceReport:

@@ -223,7 +223,7 @@ def _plain_numbers(node: Node | None, key: str, robot: Robot) -> Iterator[tuple[
         for name, below in value.items():
             if key in _BY_JOINT and name in robot.joint_names:
                 yield from _of_joint(below, robot.joint_names.index(name), robot)
-            elif name != "angle" or key == "axis_angle":  # of an arc: several turns
+            elif name != "angle" or key == "axis_angle":
                 yield from _plain_numbers(below, name, robot)
     elif isinstance(value, list):
         for index, below in enumerate(value):

@@ -278,7 +278,6 @@ def align_to_period(move: PlannedMove, rate: float) -> PlannedMove:
     if move.duration == 0:
         return move
     periods = next_periods(move.duration, rate)
-    # stretched from rest to rest, rates become less; of efforts nobody knows
     less = move.at_rest and not move.robot.limits.has_effort
     free = less or bool(over_limit(move))
     for extra in range(_TRIES):

@@ -277,7 +277,6 @@ class _Search:
     def slower(self, first: ForConsumer) -> ForConsumer:
         """Return the shortest motion that was found whose rows keep all; `first` where none was."""
         best: ForConsumer | None = None
-        # to search a motion through zones anew within each tighter limit takes seconds
         for stretched in (True, False) if self._loaded.job.names_zones else (False,):
             if stretched or best is None:
                 best = self._best_of([*self._candidates(first)], first, stretched=stretched)
