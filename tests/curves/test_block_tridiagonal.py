@@ -21,7 +21,7 @@ def system(seed, blocks, size):
     return cut[at, at], cut[at[:-1], at[1:]], dense
 
 
-@pytest.mark.parametrize("blocks", [1, 2, 3, 4, 5, 7, 8, 9, 16, 33])
+@pytest.mark.parametrize("blocks", [1, 2, 3, 4, 5, 7, 8, 9, 16, 33, 70])
 @pytest.mark.parametrize("size", [1, 3, 8])
 def test_as_dense(blocks, size):
     diagonal, right, dense = system(blocks, blocks, size)
