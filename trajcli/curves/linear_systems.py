@@ -2,8 +2,7 @@
 
 The splines of this package lead to rows whose diagonal is larger than the sum of its neighbours; elimination
 without exchanges is then stable, whatever the ratio of the lengths between waypoints. The precondition is
-checked, so that no matrix is ever solved inaccurately in silence. Systems of blocks are symmetric and
-positive definite.
+checked. Systems of blocks are symmetric and positive definite.
 
 Long systems are halved until they are short: every other unknown is eliminated at once, which leaves rows of
 the same kind, as dominated by their diagonal. The sweeps over a short one run over plain floats: for the few
