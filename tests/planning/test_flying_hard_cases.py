@@ -63,6 +63,18 @@ def test_a_corner_behind_which_another_branch_is_asked_for_is_refused_as_without
             planned(to(0.8, -0.5), line, **({} if zone is None else {"zone": zone}))
 
 
+def test_where_joints_may_step_a_limit_of_the_tools_jerk_stops_a_chain_until_they_may_not():
+    """No size and no pace of its zone helps, so none is tried; what is advised does."""
+    moves = to(0.9, 1.2), to(0.9, 0.5)
+    held = {"tcp": {"jerk": 40}}
+    stops = planned(*moves, limits={**JERKLESS, **held})
+    assert not stops.flyby.zones
+    (why,) = [event.message for event in stops.events if event.kind == "not_faster"]
+    assert why.endswith("where that of joints is not: say `limits: {jerk: ...}`")
+    flown = planned(*moves, limits={**LIMITS, **held}).flyby
+    assert flown.duration < 0.95 * flown.stopping
+
+
 @pytest.mark.full
 def test_a_limit_that_binds_in_a_zone_alone_lowers_the_pace_of_the_zone_alone():
     """Along each line one joint turns the tool, by 8 rad/s^2 at most; in the zone both do, the one and the other way."""

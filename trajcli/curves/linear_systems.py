@@ -5,9 +5,8 @@ without exchanges is then stable, whatever the ratio of the lengths between wayp
 checked. Systems of blocks are symmetric and positive definite.
 
 Long systems are halved until they are short: every other unknown is eliminated at once, which leaves rows of
-the same kind, as dominated by their diagonal. The sweeps over a short one run over plain floats: for the few
-components of a robot that is faster than array operations row by row. The result is the same to the last bit
-on every machine. Factors of 2 x 2 blocks serve any number of right sides.
+the same kind, as dominated by their diagonal. Sweeps over a short one run over plain floats, faster than
+arrays for few components, and the same to the last bit on every machine.
 
 Source: Golub and Van Loan, Matrix Computations, 4th edition (2013), sections 4.1, 4.3 and 4.5 (cyclic
 reduction); Higham, Accuracy and Stability of Numerical Algorithms, 2nd edition (2002), section 9.6.
@@ -21,7 +20,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 
 _SHORT = 48  # unknowns: fewer are not worth halving
-_DENSE = 64  # unknowns: so many are solved by the inverse of their whole matrix
+_DENSE = 64  # unknowns: fewer are solved by their inverse
 _ROUNDING = 8 * np.finfo(np.float64).eps  # of a diagonal element: what forming a row may have cost
 
 
@@ -231,7 +230,7 @@ class BlockFactors:
     pairs: CyclicFactors
 
     def solve(self, values: Array) -> Array:
-        """Return x, shape (b, 2), with A x = values, shape (b, 2); the residual gives lost digits back."""
+        """Return x, shape (b, 2), with A x = values, shape (b, 2), refined by its residual."""
         x = self._solution(values)
         residual = values - _applied(self.diagonal, x)
         residual[:-1] -= _applied(self.right, x[1:])
@@ -256,7 +255,7 @@ def block_factors(diagonal: Array, right: Array) -> BlockFactors:
 
 
 def _paired(diagonal: Array, right: Array) -> tuple[Array, Array]:
-    """Return the same matrix as blocks of shape (4, 4); a missing last one is the identity."""
+    """Return it as blocks of shape (4, 4); a missing last one is the identity."""
     size, pairs = len(diagonal), (len(diagonal) + 1) // 2
     blocks, links = np.tile(np.eye(4), (pairs, 1, 1)), np.zeros((pairs - 1, 4, 4))
     blocks[:, :2, :2] = diagonal[0::2]

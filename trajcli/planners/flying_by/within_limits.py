@@ -5,8 +5,8 @@ velocities go with f, accelerations with f^2, jerks with f^3. Where the tool is 
 derivative of the joints alone is lowered, or the pace, whichever is faster. Where it leaves its zone, smaller
 borders are tried, then a slower pace.
 
-Lines in joint space that go on in the same direction under the same limits are taken together: along one line
-no motion of the slowest joint is faster than one law.
+Lines in joint space that go on in the same direction under the same limits are one: no motion of the slowest
+joint is faster than one law.
 """
 
 from __future__ import annotations
@@ -34,11 +34,12 @@ from trajcli.trajectory import State
 
 _ROUNDS = 40  # of lowering the pace of parts
 _SIZES = (1.0, 0.9, 0.7, 0.5)  # of a zone, for its borders
-_MORE = 1e-6  # by which a pace is lowered beyond what is needed
-_LESS = 0.8  # by which it is where nobody knows how much is needed
-_SLOWEST = 0.05  # a part that would be slower than this is stopped at instead
+_MORE = 1e-6  # beyond what is needed
+_LESS = 0.8  # where nobody knows how much is needed
+_SLOWEST = 0.05  # slower parts are stopped at instead
 _PARALLEL = 1e-12  # relative: a direction that differs by less is the same
 _LIMITS = ("velocity", "acceleration", "jerk")
+_STEPS = "in zones the tool's jerk cannot be limited where that of joints is not: say `limits: {jerk: ...}`"
 
 
 @frozen
@@ -232,7 +233,7 @@ def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequenc
         PlanningError: When no motion through the zones keeps all limits.
     """
     _require_limits(moves, robots)
-    kept = [k for k, move in enumerate(moves) if _has_length(move)]
+    kept = [k for k, move in enumerate(moves) if move.planned.curve.duration > 0]
     if len(kept) < 2:
         raise PlanningError("its moves have no length")
     courses = [moves[k].planner.course(moves[k].start.position, robots[k], moves[k].planned) for k in kept]
@@ -241,10 +242,6 @@ def flown(moves: Sequence[PlannedMove], corners: Sequence[Zone], robots: Sequenc
     chain, parts, model = _within_limits(courses, zones, ends)
     indices = tuple(moves[k].index for k in kept)
     return FlownChain(indices, chain, tuple(parts), model, tuple(moves[k].robot for k in kept))
-
-
-def _has_length(move: PlannedMove) -> bool:
-    return move.planned.curve.duration > 0
 
 
 def _require_limits(moves: Sequence[PlannedMove], robots: Sequence[Robot]) -> None:
@@ -273,7 +270,7 @@ def _rates_along(course: Course, start: State) -> Array:
 def _within_limits(
     courses: Sequence[Course], zones: Sequence[ZoneAround], ends: tuple[Array, Array]
 ) -> tuple[FlyByChain, list[FlownPart], float]:
-    """Return the fastest chain found whose parts keep all limits and zones, its parts, and its `model`."""
+    """Return the fastest chain found whose parts keep limits and zones, its parts, and its `model`."""
     found, errors = [], []
     laws = CourseLaws()
     for by_order in (True, False):
@@ -322,6 +319,8 @@ def _lowered(
             continue
         changed = True
         k, in_zone = divmod(number, 2)
+        if in_zone and any(finding.kind.endswith("_jump") for finding in findings):
+            raise PlanningError(_STEPS)  # at any size and pace
         factors = [finding.factor for finding in findings]
         if None not in factors:
             slower = 1 / (max(f for f in factors if f is not None) * (1 + _MORE))
