@@ -50,6 +50,7 @@ _BASIN = 0.02  # size of grids at which the better of two searches is known
 POWERS = np.arange(1, 4)  # of a pace, in velocities, accelerations and jerks
 _ORDERS = {kind.name: kind.order for kind in TOOL_KINDS}
 _ALIKE = 0.03  # relative: a pace that changes by less is known
+_STEPS = "in zones the tool's jerk cannot be limited where that of joints is not: say `limits: {jerk: ...}`"
 
 
 @frozen
@@ -276,7 +277,9 @@ class MotionSearch:
             key = (k, corner.left, corner.joined, corner.shares, borders.tobytes())
             if key not in self._zones:
                 motion = zone_motion(self.chain, k, borders)
-                self._zones[key] = findings_of(self.chain, 2 * k + 1, motion)
+                self._zones[key] = findings = findings_of(self.chain, 2 * k + 1, motion)
+                if any(finding.kind.endswith("_jump") for finding in findings):
+                    raise PlanningError(_STEPS)  # at any size and pace
             over.append(self._zones[key])
         return over
 

@@ -39,7 +39,6 @@ _LESS = 0.8  # where nobody knows how much is needed
 _SLOWEST = 0.05  # slower parts are stopped at instead
 _PARALLEL = 1e-12  # relative: a direction that differs by less is the same
 _LIMITS = ("velocity", "acceleration", "jerk")
-_STEPS = "in zones the tool's jerk cannot be limited where that of joints is not: say `limits: {jerk: ...}`"
 
 
 @frozen
@@ -319,8 +318,6 @@ def _lowered(
             continue
         changed = True
         k, in_zone = divmod(number, 2)
-        if in_zone and any(finding.kind.endswith("_jump") for finding in findings):
-            raise PlanningError(_STEPS)  # at any size and pace
         factors = [finding.factor for finding in findings]
         if None not in factors:
             slower = 1 / (max(f for f in factors if f is not None) * (1 + _MORE))
