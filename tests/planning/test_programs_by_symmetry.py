@@ -149,6 +149,14 @@ def scale(mapping: Fields, key: str, factor: float) -> None:
         mapping[key] = [factor * each for each in value] if isinstance(value, list) else factor * value
 
 
+def scale_lengths(mapping: Fields, factor: float) -> None:
+    """Multiply the lengths of a row, a pose, a move, a law or limits of the tool, and their rates."""
+    for key in ("a", "d", "xyz", "radius", "speed"):
+        scale(mapping, key, factor)
+    for key in ("acceleration", "jerk") if "speed" in mapping else ():
+        scale(mapping, key, factor)
+
+
 def moved(job: Fields) -> float:
     """Let the cell stand elsewhere."""
     there = pose(within(np.random.default_rng(1), 1.0, 2.0))
@@ -176,11 +184,7 @@ def larger(job: Fields) -> float:
     """Let all lengths be 1.6 times as large, the tolerance of paths too."""
 
     def change(mapping: Fields) -> None:
-        for key in ("a", "d", "xyz", "radius", "speed"):
-            scale(mapping, key, 1.6)
-        if "speed" in mapping:
-            scale(mapping, "acceleration", 1.6)
-            scale(mapping, "jerk", 1.6)
+        scale_lengths(mapping, 1.6)
         if mapping.get("planner") in ("line", "arc", "screw", "path"):
             mapping["tolerance"] = {"position": 1.6e-6, "angle": 1e-6}
 
@@ -210,11 +214,7 @@ def in_degrees(job: Fields) -> float:
     """Say it in degrees and millimetres."""
 
     def change(mapping: Fields) -> None:
-        for key in ("a", "d", "xyz", "radius", "speed"):
-            scale(mapping, key, 1e3)
-        if "speed" in mapping:
-            scale(mapping, "acceleration", 1e3)
-            scale(mapping, "jerk", 1e3)
+        scale_lengths(mapping, 1e3)
         for key in ("alpha", "position", "joints", *OF_TURNS):
             if not isinstance(mapping.get(key), list) or not isinstance(mapping[key][0], dict):
                 scale(mapping, key, 1 / DEGREE)
