@@ -150,6 +150,16 @@ def test_positions_alone_become_a_log_with_a_remark(capfd: Capture) -> None:
     np.testing.assert_allclose(np.rad2deg(velocities[:, 0]), [10, -10, -10])
 
 
+@pytest.mark.parametrize("start", [0, 12, 1_700_000_000])
+def test_stamps_are_the_same_behind_a_log(capfd: Capture, start: int) -> None:
+    """Also where they are times of a clock: a log that `convert` wrote says from when its times count."""
+    Path("log.csv").write_text(f"t,q1,qd1\n{start},0,0\n{start + 1},1,0.5\n{start + 2},2,0\n")
+    assert call(capfd, "convert", "log.csv", "-o", "log.mcap").code == 0
+    assert call(capfd, "convert", "log.mcap", "-o", "back.csv").code == 0
+    stamps = [float(row.partition(",")[0]) for row in Path("back.csv").read_text().splitlines()[1:]]
+    assert stamps == [start, start + 1, start + 2]
+
+
 def test_retime_says_factor_joint_and_limit(capfd: Capture) -> None:
     Path("arm.yaml").write_text("units: {angle: deg}\njoints: [{name: wrist, velocity: 40}]\n")
     assert call(capfd, "check", "rows.csv", "--robot", "arm.yaml").code == 1

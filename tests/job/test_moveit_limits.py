@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -11,7 +13,10 @@ import pytest
 
 from trajcli.errors import FileError, InputError
 from trajcli.job.dump import dump_job
+from trajcli.job.limits_file import with_limits, with_limits_file
 from trajcli.job.read import LoadedJob, files_of, job_from_text, load_job
+from trajcli.kinematics.robot import unlimited
+from trajcli.units import Units
 
 JOB = """\
 version: 1
@@ -140,6 +145,39 @@ def test_a_resolved_job_holds_the_numbers_and_needs_no_file(tmp_path: Path) -> N
     for name in ("position", "velocity", "acceleration", "jerk"):
         assert np.array_equal(getattr(loaded.robot.limits, name), getattr(second.robot.limits, name))
     assert not [event for event in second.events if event.kind == "limits_file"]
+
+
+AROUND = {"joint_limits": {"turn": {"max_velocity": 1.7, "has_velocity_limits": True}}}
+
+
+@pytest.mark.parametrize("limits", [AROUND, {"/**": {"ros__parameters": AROUND}}])
+@pytest.mark.parametrize("given", ["option", "file", "named", "mapping"])
+def test_limits_of_a_check_may_be_of_moveit_however_they_are_given(
+    tmp_path: Path, limits: dict[str, object], given: str
+) -> None:
+    """In an option, in its file, in a file that it names, and from Python: as the job does that names them."""
+    loaded = load(tmp_path, json.dumps(limits))
+    robot = replace(loaded.robot, limits=unlimited(2))
+    texts = {
+        "option": json.dumps(limits),
+        "file": str(tmp_path / "joint_limits.yaml"),
+        "named": f"{{file: {tmp_path / 'joint_limits.yaml'}}}",
+    }
+    if given == "mapping":
+        found, events = with_limits(robot, limits)
+    else:
+        found, events = with_limits_file(robot, texts[given], Units())
+    assert found.limits.velocity.tolist() == [[-1.7, 1.7], [-inf, inf]]
+    assert [event.text().partition(" has no ")[2] for event in events] == [
+        "limits of slide: the robot's own hold"
+    ]
+
+
+def test_a_flaw_of_limits_in_an_option_has_its_place_there(tmp_path: Path) -> None:
+    robot, text = load(tmp_path, json.dumps(AROUND)).robot, "{joint_limits: {turn: {max_velocity: -2}}}"
+    with pytest.raises(InputError, match="expected a number above 0, got -2") as caught:
+        with_limits_file(robot, text, Units())
+    assert str(caught.value.problems[0].place) == f"--limits:1:{text.index('-2') + 1}"
 
 
 def test_the_file_is_one_that_outputs_may_not_overwrite(tmp_path: Path) -> None:

@@ -273,6 +273,24 @@ def test_a_list_that_is_left_out_is_asked_for(arm: Path, left_out: str) -> None:
     assert problem.hint == f"write the whole of it: {left_out}=[...]"
 
 
+@pytest.mark.parametrize("rate", ["velocity", "acceleration"])
+def test_other_joints_at_a_point_between_are_not_stopped(path: Path, rate: str) -> None:
+    """What such a point leaves out is free, not zero; a joint is named, or all of them are given."""
+    path.write_text(
+        JOB.replace("{planner: quintic, ", "{planner: waypoints, through: [{joints: [5, 9]}], ").replace(
+            ", duration: 2", ""
+        )
+    )
+    with pytest.raises(InputError) as refused:
+        load_job(path, [f"moves.0.through.0.{rate}.0=3"])
+    (problem,) = refused.value.problems
+    assert problem.hint == f"write the whole of it: moves.0.through.0.{rate}=[...]"
+    (point,) = load_job(path, [f"moves.0.through.0.{rate}.j1=3"]).job.moves[0].through
+    assert getattr(point, rate).named == (True, False)
+    (point,) = load_job(path, [f"moves.0.through.0.{rate}=[3, 0]"]).job.moves[0].through
+    assert getattr(point, rate) == pytest.approx(np.radians([3, 0]))
+
+
 def test_a_number_of_the_tool_is_no_list(arm: Path) -> None:
     with pytest.raises(InputError) as refused:
         load_job(arm, ["limits.tcp.acceleration.0=3"])

@@ -10,7 +10,7 @@ from tiers import few
 
 import trajcli
 from trajcli.consumers.judgement import load_profile
-from trajcli.output.consumer import judge_as_written, refusal_of
+from trajcli.output.consumer import consumer_report, judge_as_written, refusal_of
 from trajcli.output.write import grid_of
 from trajcli.streams.formats import FORMATS, FormatName
 
@@ -66,3 +66,27 @@ def test_decimals_are_those_of_the_file() -> None:
     assert [found.kind for found in rounded.findings] == ["quantisation"]
     assert rounded.findings[0].value == pytest.approx(4.0)  # 8 times half of 1e-9, over 1e-9 s^3
     assert exact.findings == ()
+
+
+@pytest.mark.parametrize("form", ["csv", "mcap", "npz", "ros", "ros-goal"])
+@pytest.mark.parametrize("start_time", [0.0, 1.5, 7.0])
+def test_what_breaks_a_rule_is_in_its_move_whenever_the_rows_begin(
+    form: FormatName, start_time: float
+) -> None:
+    """The last velocity is that of the last move, at the end of the motion; a goal counts its times from 0."""
+    moves = [
+        {"planner": "quintic", "to": {"joints": [1.0]}, "duration": 1},
+        {"planner": "quintic", "to": {"joints": [2.0], "velocity": [0.5]}, "duration": 1},
+    ]
+    output = {"columns": ["t", "q", "qd", "qdd"], "rate": 50, "start_time": start_time}
+    plan = trajcli.plan(
+        {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0]}, "moves": moves, "output": output}
+    )
+    judged = judge_as_written(plan, grid_of(plan), load_profile("ros-jtc"), FORMATS[form])
+    refused = refusal_of(plan, judged, strict=False)
+    assert refused is not None
+    (problem,) = refused.problems
+    assert (problem.move, problem.kind) == (1, "jtc-last-velocity")
+    assert problem.time == pytest.approx(2.0)
+    (found,) = consumer_report(plan, judged).findings
+    assert (found.move, found.time) == (1, pytest.approx(2.0))

@@ -76,3 +76,9 @@ def test_lines_must_be_as_wide_as_said():
     for text in (b"1.000000000\n2.000000000,3.000000000\n4.000000000\n", b"1.000000000\n2.000000000\n"):
         with pytest.raises(NotFixedError):
             scan_fixed(text, [9, 9])
+
+
+@pytest.mark.parametrize("text", ["1.000000000\n2", "1.000000000\n2.00000000", "1.000000000\n "])
+def test_what_stands_behind_the_last_line_is_not_lost(text):
+    with pytest.raises(NotFixedError):
+        scan_fixed(text.encode(), [9])

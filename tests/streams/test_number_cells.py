@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from trajcli.streams import text_rows
 from trajcli.streams.decimals import NotFixedError
-from trajcli.streams.number_cells import scan_decimals
+from trajcli.streams.number_cells import decimals_of, encode_full, scan_decimals
 from trajcli.streams.table import read_csv
 
 FORMS = ["{!r}", "{:.18e}", "{:.6f}", "{:.3e}", "{:.15g}", "{:+.12f}", "{:.16E}", " {:.9f}"]
@@ -83,6 +84,71 @@ def test_what_is_no_number_is_refused(text):
 def test_decimals_are_those_of_the_text():
     text = b"1.25,3,1e-3,5.,2.50e1\n-1.5,3,1.25e-3,7,1e3\n"
     assert scan_decimals(text, 5)[1].tolist() == [2, 0, 5, 0, 1]
+
+
+ODD = [
+    "5.",
+    ".5",
+    "1e+05",
+    "1.25e+3",
+    "2.5E-03",
+    "-1e-007",
+    "3E+2",
+    "12",
+    "-0.50",
+    "7e-0",
+    "1.e-4",
+    "1e-2500",
+]
+ODD += [f"1.5e{sign}{'0' * 30}12" for sign in ("", "-")]
+
+
+def shown(cell):
+    """Return how many decimals a text has when it is written without an exponent, by exact arithmetic."""
+    return min(max(0, -Decimal(cell).as_tuple().exponent), 2000)
+
+
+def test_decimals_of_every_form_are_those_of_exact_arithmetic():
+    """Alone, and in lines where some cells have a point or an exponent and others have none."""
+    generator = np.random.default_rng(4)
+    cells = ODD + [
+        f"{generator.normal():.{generator.integers(0, 7)}{kind}}" for kind in "feE" for _ in range(8)
+    ]
+    for cell in cells:
+        assert scan_decimals(f"{cell}\n".encode(), 1)[1].tolist() == [shown(cell)], cell
+        assert decimals_of(f" {cell} ".encode()) == shown(cell), cell
+    for _ in range(40):
+        rows = [[str(cell) for cell in generator.choice(cells, 3)] for _ in range(3)]
+        text = "".join(",".join(row) + "\n" for row in rows).encode()
+        assert scan_decimals(text, 3)[1].tolist() == [
+            max(map(shown, column)) for column in zip(*rows, strict=True)
+        ], rows
+
+
+@pytest.mark.parametrize("line", ["-0,1", "1,-0", "-0.0,-0"])
+def test_a_zero_keeps_its_sign_in_either_cell(line):
+    expected = bits([list(map(float, line.split(",")))])
+    np.testing.assert_array_equal(bits(scan_decimals(f"{line}\n".encode(), 2)[0]), expected)
+
+
+@pytest.mark.parametrize("text", ["1.25 ,3\n", "3,1.25 \n", "1\n2\n", "1,2\n3\n", "1,2,3\n4\n"])
+def test_lines_of_another_form_than_two_cells_are_refused(text):
+    with pytest.raises(NotFixedError):
+        scan_decimals(text.encode(), 2)
+
+
+@pytest.mark.parametrize("cell", ["true", "null", '"5"', "[1]", "1" + "0" * 400])
+def test_values_of_json_that_are_no_numbers_are_refused(cell):
+    with pytest.raises(NotFixedError):
+        scan_decimals(f"{cell}\n".encode(), 1)
+
+
+def test_every_column_of_whole_numbers_is_written_without_a_point():
+    lines = encode_full(np.array([[1.0, 0.1, -3.0], [2.0, 1e-30, 4.0]]), [0, 2]).decode().splitlines()
+    assert [(int(a), float(b), int(c)) for a, b, c in (line.split(",") for line in lines)] == [
+        (1, 0.1, -3),
+        (2, 1e-30, 4),
+    ]
 
 
 def test_ordinary_files_are_read_by_blocks(tmp_path, monkeypatch):

@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 import io
+from decimal import Decimal
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.columns import parse_column
 from trajcli.errors import FileError, InputError
 from trajcli.streams import table
 from trajcli.streams.csv import write_csv
 from trajcli.streams.table import read_csv
+from trajcli.streams.text_layout import read_header
 
 
 def read(tmp_path, text):
@@ -175,3 +178,68 @@ def test_a_comma_is_no_decimal_one_where_points_came_before(tmp_path):
     ((place, message),) = flaws(tmp_path, "t;q1;note\n0;1;1\n1;0.5;1\n2;1,234;1\n")
     assert place.startswith("in.csv:4")
     assert "q1 is '1,234'" in message or "the line has" in message
+
+
+WAYS = [  # separator, decimal mark, what stands around cells, at the end of a line, line feed
+    (separator, mark, around, behind, feed)
+    for separator in (",", ";", "\t", " ")
+    for mark in (".", ",")[: 1 + (separator != ",")]
+    for around in ("", " ", "  ", *(["\t"] if separator in ",;" else []))
+    for behind in ("", separator)[: 1 + (separator != " ")]
+    for feed in ("\n", "\r\n")
+]
+
+
+def laid_out(cells, way):
+    """Return a table of texts in a layout; names have neither decimals nor a separator behind the last."""
+    separator, mark, around, behind, feed = way
+    beside = around if separator != " " else around + " "
+    glue = f"{beside}{separator}{beside}" if separator != " " else beside
+    lines = [around + glue.join(cells[0]) + feed]
+    lines += [around + glue.join(row).replace(".", mark) + around + behind + feed for row in cells[1:]]
+    return "".join(lines).encode()
+
+
+@pytest.mark.parametrize("chunk", [1 << 20, 48])
+@pytest.mark.parametrize("way", few(WAYS, 24))
+def test_a_table_is_the_same_in_every_layout(tmp_path, monkeypatch, way, chunk):
+    """Values are those of `float`, decimals those of exact arithmetic, and flaws stand where the cell does."""
+    monkeypatch.setattr(table, "_CHUNK", chunk)
+    generator = np.random.default_rng(7)
+    rows = [
+        [str(k), f"{generator.normal():.{1 + k % 4}f}", f"{generator.normal():.3e}", str(-2.5 * (k % 3))]
+        for k in range(12)
+    ]
+    cells = [["t", "aq1", "q1", "q2"], *rows]
+    found = read(tmp_path, laid_out(cells, way))
+    assert found.names == tuple(cells[0])
+    np.testing.assert_array_equal(found.columns, [[float(cell) for cell in row] for row in rows])
+    shown = [[-Decimal(cell).as_tuple().exponent for cell in row] for row in rows]
+    assert found.decimals.tolist() == np.maximum(shown, 0).max(axis=0).tolist()
+    for row, column in ((1, 0), (1, 3), (7, 1), (12, 3)):
+        wrong = [list(line) for line in cells]
+        wrong[row][column] = "1x"
+        with pytest.raises(InputError) as caught:
+            read(tmp_path, laid_out(wrong, way))
+        (problem,) = caught.value.problems
+        assert problem.message == f"{cells[0][column]} is '1x', expected a finite number"
+        place = problem.place
+        assert (place.line, place.source[place.column - 1 :][: place.length].strip()) == (row + 1, "1x")
+        assert place.source.strip() == laid_out(wrong, way).decode().splitlines()[row].strip()
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+@pytest.mark.parametrize("sign", ["", "# ", "#"])
+def test_a_name_is_shown_where_its_own_column_is_named(separator, sign):
+    """Also where another name holds it, in front of it or behind."""
+    names = ("aq1", "q1", "q10", "t", "q")
+    text = sign + separator.join(names)
+    header, _ = read_header(io.BytesIO(f"{text}\n1,2,3,4,5\n".encode()), "in.csv")
+    assert header.names == names
+    begins = len(sign)
+    for name in names:
+        place = header.place(name)
+        assert (place.column - 1, place.length) == (begins, len(name)), name
+        begins += len(name) + 1
+    whole = header.place()
+    assert (whole.column, whole.length) == (1, len(text))

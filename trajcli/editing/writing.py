@@ -216,6 +216,7 @@ def _recording(motion: EditedMotion, knots: Knots) -> Recording:
     metadata = {
         "version": __version__,
         "source": motion.rows.source,
+        "epoch": "0",
         "units": "SI: rad or m by joint, s; epoch in ns",
     }
     return Recording(

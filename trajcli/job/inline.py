@@ -6,11 +6,9 @@ import re
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem
-from trajcli.job.messages import problems_of
+from trajcli.job.messages import validated
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import parse_document, read_document
 from trajcli.kinematics.robot import Payload, Robot
@@ -100,10 +98,7 @@ def inline_target(word: str, name: str, units: Units, robot: Robot) -> AskedPose
     """
     document = inline_document(word, name)
     context = ReadingContext(units, robot.joint_names, robot.joint_types)
-    try:
-        target = AskedPose.model_validate(document.plain(), context=context)
-    except ValidationError as error:
-        raise InputError(*problems_of(error, AskedPose, document)) from None
+    target = validated(AskedPose, document.plain(), document, context)
     if not target.gives_pose:
         hint = "give a position, an orientation or both, such as {xyz: [0.4, 0, 0.3], rpy: [0, 0, 0]}"
         raise InputError(Problem("the target fixes nothing", hint, document.place(())))
@@ -123,11 +118,7 @@ def inline_payload(word: str, name: str, units: Units) -> Payload:
         FileError: When the file cannot be read.
     """
     document = inline_document(word, name)
-    try:
-        spec = PayloadSpec.model_validate(document.plain(), context=ReadingContext(units))
-    except ValidationError as error:
-        raise InputError(*problems_of(error, PayloadSpec, document)) from None
-    return spec.as_payload()
+    return validated(PayloadSpec, document.plain(), document, ReadingContext(units)).as_payload()
 
 
 def read_at(document: Document, units: Units, read: Callable[[Any, ReadingContext], T]) -> T:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from trajcli.errors import InputError
-from trajcli.job.files.moveit_limits import read_moveit_limits
+from trajcli.job.files.moveit_limits import MoveItReader, read_moveit_limits
 from trajcli.job.limits import with_job_limits
-from trajcli.job.messages import problems_of
+from trajcli.job.messages import validated
 from trajcli.job.model import UnitsSpec
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import parse_document, read_document
 from trajcli.kinematics.robot import Robot
-from trajcli.language.limits import JobLimitsSpec, LimitsSpec
+from trajcli.language.limits import JobLimitsSpec
 from trajcli.language.numbers import ReadingContext
 from trajcli.planners.planner import Event
 from trajcli.units import Units
@@ -58,29 +55,26 @@ def with_limits(robot: Robot, limits: Mapping[str, Any]) -> tuple[Robot, tuple[E
 def _applied(robot: Robot, document: Document, units: Units) -> tuple[Robot, tuple[Event, ...]]:
     plain = dict(document.plain())
     units = _stated_units(plain.pop("units", None), document, units)
-    spec: LimitsSpec | None = None
-    noted: tuple[Event, ...] = ()
-    file = Path(document.file).name if any(key in plain for key in _MOVEIT) else plain.get("file")
-    if not any(key in plain for key in _MOVEIT):
+    spec, of_file = JobLimitsSpec(), None
+    if any(map(_is_of_moveit, plain.items())):
+        of_file = MoveItReader(document, robot).read()
+    else:
         context = ReadingContext(units, robot.joint_names, robot.joint_types)
-        try:
-            spec = JobLimitsSpec.model_validate(plain, context=context)
-        except ValidationError as error:
-            raise InputError(*problems_of(error, JobLimitsSpec, document)) from None
-    if file is not None:
-        of_file = read_moveit_limits(file, document, robot)
-        spec, noted = of_file.under(spec or JobLimitsSpec()), of_file.events
-    effective, events = with_job_limits(robot, spec, "the given")
-    return effective, (*noted, *events)
+        spec = validated(JobLimitsSpec, plain, document, context)
+        if spec.file is not None:
+            of_file = read_moveit_limits(spec.file, document, robot)
+    effective, events = with_job_limits(robot, of_file.under(spec) if of_file else spec, "the given")
+    return effective, (*(of_file.events if of_file else ()), *events)
+
+
+def _is_of_moveit(entry: tuple[str, Any]) -> bool:
+    return entry[0] in _MOVEIT or (isinstance(entry[1], Mapping) and "ros__parameters" in entry[1])
 
 
 def _stated_units(value: Any, document: Document, units: Units) -> Units:  # noqa: ANN401
     """Return the units that a file says, and those known before for what it does not say."""
     if value is None:
         return units
-    try:
-        stated = UnitsSpec.model_validate(value)
-    except ValidationError as error:
-        raise InputError(*problems_of(error, UnitsSpec, document, ("units",))) from None
+    stated = validated(UnitsSpec, value, document, None, ("units",))
     given = {name: getattr(stated, name) for name in stated.model_fields_set}
     return Units(given.get("angle", units.angle), given.get("length", units.length))

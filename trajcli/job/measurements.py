@@ -7,14 +7,13 @@ from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
 
 from trajcli.columns import GROUPS, Column, group_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem, TrajcliError
 from trajcli.geometry.rotation import QUATERNION_DEFECT, matrix_from_quaternion
 from trajcli.job.files.recorded_values import joint_columns
-from trajcli.job.messages import problems_of
+from trajcli.job.messages import validated
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
@@ -27,7 +26,6 @@ from trajcli.streams.table import Table, read_csv
 from trajcli.suggest import did_you_mean
 from trajcli.units import Quantity, Units
 
-M = TypeVar("M", bound=BaseModel)
 V = TypeVar("V")
 _Deviation = tuple[float | None, float | None] | None
 _AXES, _QUATERNION, _DEVIATIONS = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("position", "angle")
@@ -103,7 +101,7 @@ def read_configurations(path: str, robot: Robot, units: Units) -> Array:
         return joint_columns(read_csv(path), robot)
 
     def joints(item: Any, document: Document, index: int, context: ReadingContext) -> Any:  # noqa: ANN401
-        return _validated(ConfigurationSpec, item, document, index, context).joints
+        return validated(ConfigurationSpec, item, document, context, (index,)).joints
 
     return np.array(_entries(path, robot, units, joints)[1])
 
@@ -144,19 +142,6 @@ def _entries(
     return document, entries
 
 
-def _validated(
-    model: type[M],
-    item: Any,  # noqa: ANN401
-    document: Document,
-    index: int,
-    context: ReadingContext,
-) -> M:
-    try:
-        return model.model_validate(item, context=context)
-    except ValidationError as error:
-        raise InputError(*problems_of(error, model, document, (index,))) from None
-
-
 def _measurement(
     item: Any,  # noqa: ANN401
     document: Document,
@@ -167,13 +152,13 @@ def _measurement(
     pose = item.get("pose") if isinstance(item, Mapping) else None
     xyz = pose.get("xyz") if isinstance(pose, Mapping) else None
     if not (isinstance(xyz, list) and len(xyz) == 3 and None in xyz) or pose is None:
-        return _validated(MeasurementSpec, item, document, index, context), None
+        return validated(MeasurementSpec, item, document, context, (index,)), None
     x, y, z = (entry is not None for entry in xyz)
     if not (x or y or z):
         message = "no coordinate of xyz was measured"
         raise InputError(Problem(message, "leave xyz out", document.place((index, "pose", "xyz"))))
     filled = {**item, "pose": {**pose, "xyz": [0.0 if entry is None else entry for entry in xyz]}}
-    return _validated(MeasurementSpec, filled, document, index, context), (x, y, z)
+    return validated(MeasurementSpec, filled, document, context, (index,)), (x, y, z)
 
 
 def _measured(

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, get_origin
+from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from trajcli.errors import Problem
+from trajcli.errors import InputError, Problem
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document
 from trajcli.language.limits import LimitsSpec
-from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, shown
+from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, ReadingContext, shown
 from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS, defaults_of_paths
 from trajcli.suggest import abridged, did_you_mean, valid_names
 
+M = TypeVar("M", bound=BaseModel)
 _KINDS = {
     "bool_parsing": "true or false",
     "bool_type": "true or false",
@@ -112,6 +113,20 @@ _PLANNERS_ELSEWHERE = {
 }
 """Planners of other programs that are more than another name."""
 _NEEDS_NO_LIMIT = "quintic"  # the shape of a law that a duration is enough for
+
+
+def validated(
+    model: type[M], value: object, document: Document, context: ReadingContext | None, at: FieldPath = ()
+) -> M:
+    """Return what a model makes of the plain content of a document at a path.
+
+    Raises:
+        InputError: With every flaw of it.
+    """
+    try:
+        return model.model_validate(value, context=context)
+    except ValidationError as error:
+        raise InputError(*problems_of(error, model, document, at)) from None
 
 
 def problems_of(

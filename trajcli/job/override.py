@@ -38,7 +38,7 @@ _BARE = (
 """Lists that a job leaves out without another taking their place."""
 _RATES = ("velocity", "acceleration", "deceleration")
 """Likewise where they stand in a move."""
-_STATES = frozenset(("start", "points", "to", "through"))
+_STATES = frozenset(("start", "points", "to"))
 """Keys of states, or of what holds them: rates that one leaves out are zero."""
 
 
@@ -194,21 +194,16 @@ def _robot(document: Document) -> Robot:
 
 def _in_force(document: Document, *, scaled: bool) -> Robot:
     """Return the robot of a job with the job's limits in force, as they are with or without its `scale`."""
-    from pydantic import ValidationError
-
     from trajcli.job.files.moveit_limits import read_moveit_limits
     from trajcli.job.limits import with_job_limits
-    from trajcli.job.messages import problems_of
+    from trajcli.job.messages import validated
     from trajcli.job.model import units_of
     from trajcli.language.limits import JobLimitsSpec, LimitsSpec, Scale
     from trajcli.language.numbers import ReadingContext
 
     robot, plain = _robot(document), document.plain()
     context = ReadingContext(units_of(plain.get("units")), robot.joint_names, robot.joint_types)
-    try:
-        spec = JobLimitsSpec.model_validate(plain.get("limits", {}), context=context)
-    except ValidationError as error:
-        raise InputError(*problems_of(error, JobLimitsSpec, document, ("limits",))) from None
+    spec = validated(JobLimitsSpec, plain.get("limits", {}), document, context, ("limits",))
     limits: LimitsSpec = spec if scaled else spec.model_copy(update={"scale": Scale()})
     if spec.file is not None:
         limits = read_moveit_limits(spec.file, document, robot).under(limits)

@@ -118,7 +118,10 @@ def judge_as_written(
         except InputError as error:
             text = f"the rows cannot be judged by {profile.name}: {error.problems[0].message}"
             raise InputError(text, hint="`output.columns` needs t and q") from None
-        return judge_by_profile(motion.blocks(), profile, around)
+        judged = judge_by_profile(motion.blocks(), profile, around)
+    before = plan.trajectory.start_time * (form.content == "knots")  # times of a goal begin with 0
+    findings = tuple(replace(found, time=(found.time or 0.0) + before) for found in judged.findings)
+    return replace(judged, findings=findings)
 
 
 def _ending(form: StreamFormat) -> str:

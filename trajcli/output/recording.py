@@ -19,6 +19,7 @@ from trajcli.job.read import files_of
 from trajcli.kinematics.robot import Robot
 from trajcli.knots import Knots, knots_of
 from trajcli.planning.plan import Plan
+from trajcli.streams.mcap.messages import OF_GEOMETRY
 from trajcli.streams.mcap.recording import AttachedFile, Compression, LinkFrames, LoggedPath, Recording
 from trajcli.suggest import did_you_mean, valid_names
 from trajcli.trajectory import Trajectory
@@ -30,8 +31,6 @@ TOPICS = (
     *("/joint_trajectory_point", "/tool_twist"),
 )
 """The topics of a log; the last two only where they are asked for."""
-OF_GEOMETRY = ("/robot_description", "/tf_static", "/tf", "/tool_path", "/tool_twist")
-"""Those that an arm without geometry has not."""
 
 _PER_SECOND = 1_000_000_000
 _LATEST = 2**31 - 1  # s: what a time of ROS 2 can say

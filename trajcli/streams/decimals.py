@@ -102,10 +102,9 @@ def _put_wide(words: _Words, negative: _Bools, whole: Array) -> None:
 
 def _put_fraction(words: _Words, fraction: Array) -> None:
     """Write point, nine digits and a comma into `words` (N, 3); `fraction` (N,) is used up."""
-    # The quotients of whole numbers are off their next lower whole number by far less than the summand.
-    first = np.floor(fraction * 1e-6 + 1e-7)
+    first = np.floor(fraction * 1e-6)  # exact, as the next, for all whole numbers below 1e9
     fraction -= 1e6 * first
-    middle = np.floor(fraction * 1e-2 + 1e-3)
+    middle = np.floor(fraction * 1e-2)
     fraction -= 1e2 * middle
     tenths, digits, ends = _fraction_tables()
     words[:, 0] = tenths[first.astype(np.intp)]

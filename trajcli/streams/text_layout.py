@@ -44,9 +44,10 @@ class Header:
 
     def place(self, name: str | None = None) -> Place:
         """Return where a name stands, or the whole line."""
-        at = -1 if name is None else self.text.find(name)
-        length = len(self.text) if name is None or at < 0 else len(name)
-        return Place(self.file, self.line, max(at, 0) + 1, self.text, max(length, 1))
+        if name not in self.names:
+            return Place(self.file, self.line, 1, self.text, max(len(self.text), 1))
+        at = self.text.find(name, _column_of(self.text, self.names.index(name)) - 1)
+        return Place(self.file, self.line, max(at, 0) + 1, self.text, max(len(name), 1))
 
 
 def read_header(stream: BinaryIO, file: str) -> tuple[Header, bytes]:
@@ -164,7 +165,7 @@ class RowLayout:
         if self.separator == " ":
             return [(match.start() + 1, match[0]) for match in re.finditer(r"\S+", line)]
         return list(_split(line, self.separator))[
-            : -1 if self.open_ended and line.rstrip().endswith(self.separator) else None
+            : -1 if self.open_ended and line.rstrip(" \r").endswith(self.separator) else None
         ]
 
     def number(self, cell: str) -> bytes:

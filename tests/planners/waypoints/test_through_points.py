@@ -54,6 +54,25 @@ def test_units_stand_in_the_columns_names(tmp_path):
     )  # a plain name is SI whatever the job's units are
 
 
+@pytest.mark.parametrize(
+    "columns", ["t,q1,q2", "t,q1_mm,q2_mm", "t,x,y", "t,q1,q2,x,y,z,qw,qx,qy,qz", "x_mm,y,z,q2,q1,t"]
+)
+def test_joints_of_a_slide_may_be_called_as_the_tool_moves(tmp_path, columns):
+    """Beside numbered columns x, y, z are the tool's, as `plan` writes them; alone they are the joints' own."""
+    robot = {"joints": [{"name": "x", "type": "prismatic"}, {"name": "y", "type": "prismatic"}]}
+    points = [[0.0, 0.0], [0.5, 0.25], [1.0, -0.5]]
+    names = columns.split(",")
+    first, second = ("q1", "q2") if "q1" in columns else ("x", "y")
+
+    def cell(name, k):
+        plain, mm = name.removesuffix("_mm"), 1000 if name.endswith("_mm") else 1
+        return {"t": k, first: points[k][0], second: points[k][1]}.get(plain, 7.0 + k) * mm
+
+    rows = [columns, *(",".join(str(cell(name, k)) for name in names) for k in range(3))]
+    made = recorded(tmp_path, "\n".join(rows) + "\n", robot=robot, limits={})
+    assert_passes(made, [0, 1, 2], points)
+
+
 def test_times_count_from_the_first_row_where_the_arm_stands(tmp_path):
     made = recorded(tmp_path, "t,q1,q2\n10,0,0\n11,1,0\n13,1,1\n")
     assert made.moves[0].planned.via_points.times.tolist() == [0, 1, 3]
@@ -127,6 +146,7 @@ WRONG_FILES = {
     "q1,q2\n0,0\n1,x\n": "points.csv:3:3: q2 is 'x', expected a finite number",
     "q1,q2\n0,0\n1,nan\n": "q2 is 'nan', expected a finite number",
     "q1,q1_deg,q2\n0,0,0\n": "two columns for j1: q1 and q1_deg",
+    "q1,j1,q2\n0,0,0\n": "two columns for j1: q1 and j1",
     "q1,q2_mm\n0,0\n": "the column q2_mm is in mm, but j2 is revolute (call it q2 (SI) or ..._deg)",
     "t,q1,q2\n0,0,0\n1,1,1\n1,2,2\n": "times must increase, but row 3 has t = 1 s after 1 s (remove the rows",
     "time,q1,q2\n1,1,0\n2,1,1\n": "times stand in the column t, in s; this file has 'time' (call it t",

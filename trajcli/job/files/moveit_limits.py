@@ -89,10 +89,10 @@ def read_moveit_limits(path: str, document: Document, robot: Robot) -> MoveItLim
         limits = read_document(str(folder / path))
     except FileError as error:
         raise error.located(place=document.place(("limits", "file"))) from None
-    return _Reader(limits, robot).read()
+    return MoveItReader(limits, robot).read()
 
 
-class _Reader:
+class MoveItReader:
     """Reads one file, and gathers its flaws and events."""
 
     def __init__(self, document: Document, robot: Robot) -> None:

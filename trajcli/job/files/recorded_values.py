@@ -98,9 +98,7 @@ def joint_columns(table: Table, robot: Robot) -> Array:
         positions[:, joint] = _joint(table, robot, joint, known)
     if max(positions.max(initial=0.0), -positions.min(initial=0.0)) > LARGEST_POSITION:
         most = f"{LARGEST_POSITION:g} rad or m"
-        raise InputError(
-            f"{table.file}: a value is larger than {most}", hint="check its exponent and its unit"
-        )
+        raise InputError(f"{table.file}: a value is larger than {most}", hint="check its exponent and unit")
     positions.flags.writeable = False  # who keeps it takes it without a copy
     return positions
 
@@ -120,6 +118,9 @@ def _joint(table: Table, robot: Robot, joint: int, known: list[tuple[str, Column
     name, kind = robot.joint_names[joint], robot.joint_types[joint]
     unit = "mm" if kind == "prismatic" else "deg"
     candidates = [each for each in known if each[1].joint == joint]
+    if len(candidates) > 1:  # beside q1 a column x is the tool's, whatever joints are called
+        own = [each for each in candidates if parse_column(each[0]).kind not in _LENGTHS]
+        candidates = own or candidates
     if not candidates:
         hint = f"call it q{joint + 1} (SI) or q{joint + 1}_{unit}"
         raise InputError(f"{table.file}: no column for {name}", hint=hint)

@@ -149,7 +149,7 @@ class ForConsumer:
             share, order, joint, _ = used
             name = self.plan.trajectory.joint_names[joint]
             words = f", {100 * share:.4g} % of the {QUANTITIES[order]} of {name} used"
-        longer = self.plan.trajectory.duration / self.shortest - 1 if self.shortest else 0.0
+        longer = self.duration / self.shortest - 1 if self.shortest else 0.0
         cost = f"; {100 * longer:.2g} % longer than between the rows" if longer > _LONGER else ""
         bits = ", every bit of its numbers written" if self.digits == "full" and self.chosen else ""
         return f"{self.where}{bits}: joined as it will be{words}{cost}"
@@ -321,10 +321,10 @@ class _Search:
 
         Breaks on rows do least harm: such a motion is found soon, and ends the search of others early.
         """
-        best, rank, enough = None, 0, first.plan.trajectory.duration * (1 + _ENOUGH)
+        best, rank, enough = None, 0, first.duration * (1 + _ENOUGH)
         order = sorted(range(len(candidates)), key=lambda number: -_breaks_on_rows(*candidates[number]))
         for number in order:
-            longest = np.inf if best is None else best.plan.trajectory.duration
+            longest = np.inf if best is None else best.duration
             if longest <= enough:
                 break
             if number > rank:
@@ -358,9 +358,9 @@ class _Search:
             return None
         from trajcli.output.delivery.slower_motion import StretchedMoves
 
-        duration, rate = first.plan.trajectory.duration, first.grid.rate
+        duration, rate = first.duration, first.grid.rate
         by_move = StretchedMoves(first.rows, rate, self._begun.fastest)
-        longest = np.inf if best is None else best.plan.trajectory.duration
+        longest = np.inf if best is None else best.duration
         most = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
         for periods in range(1, min(most, _FEW_THROUGH_ZONES) if self._loaded.job.names_zones else most):
             factor = 1 + periods / (rate * duration)
@@ -372,7 +372,7 @@ class _Search:
                 made = self.attempt(
                     self._with_output({"align": True}), replace(self._begun, stretches=stretches)
                 )
-                if made.plan.trajectory.duration >= longest:
+                if made.duration >= longest:
                     return None
                 if made.clean:
                     return made
@@ -391,7 +391,7 @@ class _Search:
         for count in range(_ROUNDS):
             report_progress(f"planning for {self._profile.name}, round {count + 1}")
             made = self.attempt(loaded, adapted) if count else self._begins(loaded, adapted)
-            if made.plan.trajectory.duration > longest:
+            if made.duration > longest:
                 return None
             if made.clean or not made.plan.verdict.passed:
                 return made if made.clean else None
@@ -416,14 +416,14 @@ class _Search:
                     set_columns(columns),
                 ]
                 instead = " in place of `--for`"
-            duration = first.plan.trajectory.duration
+            duration = first.duration
             yield f"`{' '.join(options)}`{instead} keeps all limits, with {duration:.6g} s as now"
         job = self._loaded.job.model_copy(update={"when_over_limit": "slow"})
         slow = _Search(replace(self._loaded, job=job), self._profile, self._writing, self._carried)
         slow._begun = self._begun.where_slowed()
         slower = slow.slower(first)
         if slower.keeps:
-            duration = slower.plan.trajectory.duration
+            duration = slower.duration
             yield f"`--set when_over_limit=slow` keeps all limits, with {duration:.6g} s"
 
     def _said_by_job(self) -> Iterator[str]:

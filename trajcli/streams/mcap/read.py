@@ -159,14 +159,8 @@ def _paired(
 
 
 def _rows(series: JointSeries, rows: slice) -> JointSeries:
-    return replace(
-        series,
-        nanoseconds=series.nanoseconds[rows],
-        position=series.position[rows],
-        velocity=series.velocity[rows],
-        acceleration=series.acceleration[rows],
-        effort=series.effort[rows],
-    )
+    names = ("nanoseconds", *_ARRAYS[1:])
+    return replace(series, **{name: getattr(series, name)[rows] for name in names})
 
 
 def _other_stamps(file: str) -> InputError:
