@@ -79,6 +79,44 @@ def test_two_points_are_the_trapezoid(distance, v, a):
     assert total(segments, blends) == pytest.approx(best, rel=1e-6)
 
 
+@pytest.mark.parametrize("limit", [0.3, 1.0, np.inf])
+@pytest.mark.parametrize("legs", [1, 2])
+def test_the_total_time_is_a_minimum_to_a_ten_millionth(legs, limit):
+    """Of one leg, or of one there and back: the blend at the turn lasts as long as those at both ends together."""
+    acceleration = 1.7
+    segments, blends = fastest_blends(
+        [[0.0], [1.0], [0.0]][: legs + 1], two_sided([limit]), two_sided([acceleration])
+    )
+    v = min(limit, np.sqrt(acceleration / (1.0 if legs == 1 else 1.5)))
+    assert total(segments, blends) == pytest.approx(legs / v + v / acceleration, rel=2e-7)
+
+
+@pytest.mark.parametrize("seed", few(range(20)))
+def test_a_blend_is_as_short_as_the_limits_let_it_or_a_thousandth_of_a_segment(seed):
+    rng = np.random.default_rng(seed)
+    q = np.cumsum(rng.normal(size=(9, 2)), axis=0)
+    q[4] = 0.5 * (q[3] + q[5])
+    v, a = rng.uniform(0.1, 0.3, (2, 2)) * [-1, 1], rng.uniform(5, 20, (2, 2)) * [-1, 1]
+    a *= (
+        20.0 if seed % 2 else 1.0
+    )  # the blends at both ends are as short as they can be, however long the segment
+    segments, blends = fastest_blends(q, v, a)
+    velocities = np.pad(np.diff(q, axis=0) / segments[:, None], ((1, 1), (0, 0)))
+    step = np.diff(velocities, axis=0)
+    asked = np.where(step > 0, step / a[:, 1], step / a[:, 0]).max(axis=1)
+    soft = 1e-3 * np.minimum(segments[1:], segments[:-1])
+    asked[1:-1] = np.maximum(asked[1:-1], soft)
+    assert (asked[1:-1] == soft).any()
+    assert blends == pytest.approx(asked, rel=2e-9)
+
+
+def test_where_there_is_no_room_a_blend_is_shorter_still():
+    """Half of the motion speeds up, the other half slows down: nothing is left for the point in the middle."""
+    segments, blends = fastest_blends([[0.0], [1.0], [2.0]], two_sided([np.inf]), two_sided([1.0]))
+    assert (segments >= 0.5 * (blends[1:] + blends[:-1])).all()
+    assert 2 * segments == pytest.approx(blends[[0, -1]], rel=1e-3)
+
+
 def test_the_slower_ramp_counts_by_direction():
     # 1 rad: speeding up at 4, slowing down at 1, at most 1 rad/s
     segments, blends = fastest_blends([[0.0], [1.0]], [[-1.0, 1.0]], [[-1.0, 4.0]])
@@ -153,6 +191,8 @@ def test_twice_the_scale_takes_as_long():
     ("v", "a", "message"),
     [
         ([[-1, 1]], [[-np.inf, np.inf]], "joint 0 moves and has no limit of acceleration"),
+        ([[-1, 1]], [[-np.inf, 1]], "joint 0 moves and has no limit of acceleration"),
+        ([[-1, 1]], [[-1, np.inf]], "joint 0 moves and has no limit of acceleration"),
         ([[0, 1]], [[-1, 1]], "velocity must be on both sides"),
         ([[-1, 1]], [[-1, -0.5]], "acceleration must be on both sides"),
     ],

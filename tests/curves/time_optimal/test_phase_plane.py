@@ -73,6 +73,35 @@ def test_a_circle_has_the_speed_at_which_its_own_curvature_uses_the_limit() -> N
     assert plane.largest_speed(np.array([1.0])) == pytest.approx([5.0**0.5], rel=1e-12)
 
 
+def test_each_of_several_constraints_counts_at_many_points() -> None:
+    """Joints apart, each a constraint of its own, or all in one: at 600 points the curve is the same."""
+    rng = np.random.default_rng(5)
+    rows = rng.uniform(-1, 1, (3, 1, 3))
+    velocity, acceleration = (np.array([-1.0, 1.0]) * rng.uniform(0.5, 3.0, (3, 2)) for _ in range(2))
+    law = PiecewisePolynomial([0.0, 1.0], [[[1.0]], [[0.0]]])
+    s = np.linspace(0.0, 1.0, 600)
+    found = []
+    for groups in ([[0, 1, 2]], [[0], [1], [2]], [[2], [0, 1]]):
+        parts = [
+            JointConstraint(PiecewisePolynomial([0.0, 1.0], rows[:, :, g]), velocity[g], acceleration[g])
+            for g in groups
+        ]
+        plane = PhasePlane(law, tuple(parts), np.array([0.0, 1.0]), np.array([0.5]), "ratio")
+        found.append(plane.largest_speed(s))
+    for other in found[1:]:
+        np.testing.assert_allclose(other, found[0], rtol=1e-12)
+    slopes = PiecewisePolynomial([0.0, 1.0], rows).evaluate(s, 1)
+    cap = (np.where(slopes > 0, velocity[:, 1], velocity[:, 0]) / slopes).min(axis=1)
+    assert (found[0] <= cap * (1 + 1e-12)).all()
+    assert 50 < (found[0] >= cap * (1 - 1e-9)).sum() < 550
+    slower = plane.scaled(3.0)
+    assert slower.law.duration == pytest.approx(3.0)
+    assert (slower.stops.tolist(), slower.breaks.tolist()) == ([0.5], [0.0, 1.0])
+    for values in (slower.stops, slower.breaks):
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 7.0
+
+
 @pytest.mark.parametrize("name", ["time_optimal", "dispense"])
 def test_a_law_stays_below_its_curve_and_ends_with_the_move(name: str) -> None:
     planes = [

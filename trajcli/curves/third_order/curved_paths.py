@@ -39,8 +39,8 @@ def rounded_polyline(s: Array, points: Array, lengths: Array) -> tuple[Piecewise
     )
     pieces = [(starts, straight)]
     if round_at.size:
-        at, turned, room = points[round_at], turns[round_at], half[round_at]
-        pieces += _blends(s[round_at], at, turned, room, slopes[round_at - 1])
+        at, turned = points[round_at], turns[round_at]
+        pieces += _blends(s[round_at], at, turned, half[round_at], slopes[round_at - 1])
     begins = np.concatenate([begin for begin, _ in pieces])
     order = np.argsort(begins, kind="stable")
     coefficients = np.concatenate([each for _, each in pieces], axis=1)[:, order]
@@ -98,8 +98,8 @@ def _with_start_curvature(path: PiecewisePolynomial, curvature: Array) -> Piecew
         slope = slope + curvature * third + 0.5 * jerk * third**2
         curvature = curvature + jerk * third
     breaks = path.start + third * np.arange(3)
-    rest = path.coefficients[:, 1:]
-    rest = np.concatenate([np.zeros((4 - len(rest), *rest.shape[1:])), rest])
+    others = path.coefficients[:, 1:]
+    others = np.concatenate([np.zeros((4 - len(others), *others.shape[1:])), others])
     return PiecewisePolynomial(
-        np.concatenate([breaks, path.breaks[1:]]), np.concatenate([np.stack(pieces, axis=1), rest], axis=1)
+        np.concatenate([breaks, path.breaks[1:]]), np.concatenate([np.stack(pieces, axis=1), others], axis=1)
     )

@@ -136,12 +136,12 @@ def smoothed_law(
     return joined.calmed()
 
 
-def _longest_ramp(acceleration: Array, jerk: Array, most: float) -> float:
-    """Return the longest time in which the jerk of a joint ramps its acceleration up, or else the most."""
+def _longest_ramp(acceleration: Array, jerk: Array, longest: float) -> float:
+    """Return the longest time in which the jerk of a joint ramps its acceleration up, or else the longest."""
     with np.errstate(invalid="ignore"):
         ramps = np.abs(acceleration).min(axis=1) / np.abs(jerk).min(axis=1)
     ramps = ramps[np.isfinite(ramps) & (ramps > 0.0)]
-    return float(ramps.max(initial=0.0)) or most
+    return float(ramps.max(initial=0.0)) or longest
 
 
 def _section(law: PiecewisePolynomial, interval: Array) -> PiecewisePolynomial:

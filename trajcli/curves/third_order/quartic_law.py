@@ -53,7 +53,7 @@ class QuarticLaw:
         """
         mean, under = 0.5 * (self.speed[1:] + self.speed[:-1]), self._discriminant
         if not (under > 0).all():
-            raise ReversingLawError(f"no quartic leads on from s = {self.s[int(np.argmin(under > 0))]!r}")
+            raise ReversingLawError(f"no quartic leads on from s = {self.s[np.argmin(under > 0)]:.9g}")
         return np.asarray(2.0 * np.diff(self.s) / (mean + np.sqrt(under)))
 
     @cached_property
@@ -117,7 +117,7 @@ class QuarticLaw:
         acceleration = self.acceleration * b + 0.5 * self.speed * slope
         law = QuarticLaw(self.s, self.speed * np.sqrt(b), acceleration)
         if not law.forward.all():
-            raise ReversingLawError(f"the law goes back behind s = {self.s[int(np.argmin(law.forward))]!r}")
+            raise ReversingLawError(f"the law goes back behind s = {self.s[np.argmin(law.forward)]:.9g}")
         return law
 
     def calmed(self) -> QuarticLaw:
@@ -128,10 +128,10 @@ class QuarticLaw:
         """
         lengths = np.diff(self.s)
         if not (lengths > 0).all():
-            raise ReversingLawError(f"the law stands at s = {self.s[int(np.argmin(lengths))]!r}")
+            raise ReversingLawError(f"the law stands at s = {self.s[np.argmin(lengths)]:.9g}")
         law, rate = self, _CALM * 0.5 * (self.speed[1:] + self.speed[:-1]) / lengths
-        most = self.speed * np.append(rate[0], rate), self.speed * np.append(rate, rate[-1])
-        calm = np.clip(self.acceleration, -most[1], most[0])
+        high = self.speed * np.append(rate[0], rate)
+        calm = np.clip(self.acceleration, -self.speed * np.append(rate, rate[-1]), high)
         for turn in range(_CALMINGS):
             bad = ~law.forward
             if not bad.any():
@@ -139,7 +139,7 @@ class QuarticLaw:
             at = np.append(bad, False) | np.append(False, bad) | (turn == _CALMINGS - 2)
             at[[0, -1]] = False
             law = QuarticLaw(law.s, law.speed, np.where(at, calm, law.acceleration))
-        raise ReversingLawError(f"the law goes back behind s = {self.s[int(np.argmin(law.forward))]!r}")
+        raise ReversingLawError(f"the law goes back behind s = {self.s[np.argmin(law.forward)]:.9g}")
 
     def slowed(self, factor: float) -> QuarticLaw:
         """Return the law that lasts `factor` times as long."""
