@@ -197,6 +197,11 @@ def test_a_flat_arc_keeps_its_digits():
             PlanningError,
             "along the axis they are 0.2 m apart",
         ),
+        (
+            lambda: Arc([1, 0, -0.2], [0, 0, 0], [0, 0, 1], 1.0),
+            PlanningError,
+            "along the axis they are 0.2 m apart",
+        ),
         (lambda: Arc([0, 0, 1], [0, 0, 0], [0, 0, 1], 1.0), InputError, "the start lies 0 m from the axis"),
         (lambda: Arc([1, 0, 0], [1, 0, 0], [0, 0, 1], 1.0), InputError, "an arc needs a radius"),
         (lambda: Arc([1, 0, 0], [0, 0, 0], [0, 0, 0], 1.0), InputError, "an axis of length 0"),
@@ -216,6 +221,8 @@ def test_what_is_no_arc_is_named(make, error, message):
         (lambda: Arc([5e-10, 0, 0], [0, 0, 0], [0, 0, 1], 1.0), False),  # of no radius
         (lambda: Arc([1, 0, 0], [0, 0, 0], [0, 0, 1], -5e-10), False),  # of no length
         (lambda: Arc([1, 0, 0], [0, 0, 0], [0, 0, 1], -1e-8), True),
+        (lambda: Arc([1e-3, 0, 0], [0, 0, 0], [0, 0, 1], 5e-7), False),
+        (lambda: Arc([1e3, 0, 0], [0, 0, 0], [0, 0, 1], 5e-10), True),
         (lambda: Arc([0.1, 0, 2e-4], [0, 0, 0], [0, 0, 1], 1.0), False),  # above its plane by 0.002 radii
         (lambda: Arc([0.1, 0, -2e-4], [0, 0, 0], [0, 0, 1], 1.0), False),
         (lambda: Arc([0.1, 0, -5e-5], [0, 0, 0], [0, 0, 1], 1.0), True),
@@ -232,6 +239,17 @@ def test_what_is_no_arc_is_named(make, error, message):
         (lambda: Arc.around([1, 0, 0], [0, 0, 0], [-np.cos(5e-4), np.sin(5e-4), 0]), False),
         (lambda: Arc.through([0, 0, 0], [1, 1e-7, 0], [2, 0, 0]), False),  # nearly a line
         (lambda: Arc.through([0, 0, 0], [1, 3e-5, 0], [2, 0, 0]), True),
+        (
+            lambda: Arc.through([0, 0, 0], [1e-3, 0, 0], [1, 5e-7, 0]),
+            False,
+        ),  # 5e-7 rad between unequal chords
+        (lambda: Arc.through([1, 5e-7, 0], [1e-3, 0, 0], [0, 0, 0]), False),
+        (lambda: Arc.through([0, 0, 0], [1e-3, 0, 0], [1, 3e-6, 0]), True),
+        (
+            lambda: Arc.around([1, 0, 0], [0, 0, 0], [0, 1, 0], [0.05, -0.05, 1]),
+            False,
+        ),  # an axis along the chord
+        (lambda: Arc.around([1, 0, 0], [0, 0, 0], [0, 1, 0], [-0.05, 0.05, 1]), False),
     ],
 )
 def test_what_rounding_or_typed_digits_explain_is_an_arc_and_no_more(make, fits):
@@ -262,6 +280,17 @@ def test_the_message_names_the_center_that_would_do():
     with pytest.raises(PlanningError) as caught:
         Arc([1, 0, 0.2], [0, 0, 0], [0, 0, 1], 1.0)
     assert "[0, 0, 0.2] m" in caught.value.problems[0].advice()
+
+
+def test_whole_turns_are_proposed_where_the_center_can_be_another():
+    for make, helps in (
+        (lambda: Arc.around([1, 0, 0], [0, 0, 0], [1, 0, 0]), True),
+        (lambda: Arc.around([1, 0, 0], [1, 0, 0], [0, 1, 0]), False),
+        (lambda: Arc.around([1, 0, 0], [0, 1, 0], [0, 1, 0]), False),
+    ):
+        with pytest.raises(InputError) as caught:
+            make()
+        assert ("whole turns" in str(caught.value.problems[0].hint)) == helps
 
 
 def test_half_a_turn_goes_right_handed_about_its_axis():

@@ -12,12 +12,19 @@ from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
 from trajcli.geometry.paths.chain import join
-from trajcli.geometry.paths.euler_interpolation import EulerInterpolation, euler_interpolation, nearest_angles
+from trajcli.geometry.paths.euler_interpolation import (
+    EulerInterpolation,
+    angles_to_count_from,
+    beyond_half_a_turn,
+    euler_interpolation,
+    nearest_angles,
+)
 from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.geometry.paths.position import Line
 
 SEQUENCES = ["".join(s) for s in product("xyz", repeat=3) if s[0] != s[1] != s[2]]
 FRAMES = ["current", "fixed"]
+SEGMENTS = SegmentProgress(np.arange(4.0), np.zeros(2))
 ANGLES = st.tuples(*[st.floats(-6, 6)] * 3).map(np.array)
 
 
@@ -120,9 +127,119 @@ def test_where_nothing_was_typed_the_last_is_read_first():
         np.testing.assert_allclose(scipys("zyz", "current", row), matrix, rtol=0, atol=1e-12)
     assert np.abs(curve.angles[2]).max() <= np.pi
     assert np.abs(np.diff(curve.angles, axis=0)).max() <= np.pi + 1e-12
+    way = np.array([0.3, 0.7, -0.2]) + np.outer(1.2 * np.arange(-3, 1), [1, 0, 0])  # from -3.3 rad to 0.3 rad
+    found = euler_interpolation(scipys("zyz", "current", way), SEGMENTS, "zyz")
+    np.testing.assert_allclose(found.angles, way, atol=1e-9)
+
+
+@pytest.mark.parametrize("typed", [0, 1, 3])
+@pytest.mark.parametrize("frame", FRAMES)
+def test_each_angle_is_nearest_to_its_neighbours_on_the_side_of_the_last_typed_one(typed, frame):
+    """Two angles go on by 1.2 rad from border to border, more than half a turn in all."""
+    way = np.array([0.3, 0.7, -0.2]) + np.outer(1.2 * np.arange(-typed, 4 - typed), [1, 0, -1])
+    given_angles = [None] * 4
+    given_angles[typed] = way[typed] + [2 * np.pi, 0, -4 * np.pi]
+    curve = euler_interpolation(scipys("zyz", frame, way), SEGMENTS, "zyz", frame, given_angles)
+    np.testing.assert_allclose(curve.angles - way, np.tile([2 * np.pi, 0, -4 * np.pi], (4, 1)), atol=1e-9)
+    assert curve.locked == ()
+
+
+def test_of_several_typed_triples_what_is_between_is_nearest_to_the_one_behind():
+    angles = np.array([[0.1, 0.7, 0.2], [1.0, 0.7, 0.2], [2.0, 0.7, 0.2]])
+    angles[1:, 2] += 2 * np.pi
+    progress = SegmentProgress(np.array([0, 1.0, 2.0]), np.zeros(1))
+    matrices = scipys("zyz", "current", angles)
+    curve = euler_interpolation(matrices, progress, "zyz", typed=[angles[0], None, angles[2]])
+    np.testing.assert_allclose(curve.angles, angles, atol=1e-9)
+
+
+def test_each_target_at_the_lock_is_named_in_order():
+    angles = np.array([[0.3, 0, 0.2], [0.3, 0.5, 0.2], [0.1, 0, 0.2], [0.4, 0.5, 0.2]])
+    typed = [None, None, None, angles[3]]
+    assert euler_interpolation(
+        scipys("zyz", "current", angles), SEGMENTS, "zyz", "current", typed
+    ).locked == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("typed", "beyond"),
+    [
+        ([None, [0, -3.2, 0]], True),
+        ([[0.0, 0.0, 3.2], None], True),
+        ([[0, 0, 0], [4, 0, 0], [0, 0, 0]], True),
+        ([[np.pi, -np.pi, np.pi * (1 + 1e-12)]], False),
+        ([[np.pi + 1e-6, 0, 0]], True),
+        ([None, None], False),
+    ],
+)
+def test_whole_turns_are_meant_where_any_angle_is_beyond_half_a_turn(typed, beyond):
+    assert beyond_half_a_turn(typed) == beyond
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_typed_angles_count_where_they_give_the_rotation(frame):
+    typed, target = np.array([0.3, 0.7, -0.2 + 4 * np.pi]), np.array([0.0, 0.5, 9.0])
+    there = scipys("xyz", frame, typed)
+    near = scipys("xyz", frame, typed + 1e-8)  # as near as joints tell
+    for rotation in (there, near):
+        np.testing.assert_array_equal(angles_to_count_from(rotation, "xyz", frame, target, typed), typed)
+    away = scipys("xyz", frame, typed + 1e-4)
+    for given_angles, rotation in ((typed, away), (None, there)):
+        found = angles_to_count_from(rotation, "xyz", frame, target, given_angles)
+        np.testing.assert_allclose(scipys("xyz", frame, found), rotation, atol=1e-12)
+        assert np.abs(found[2]) <= np.pi + 1e-12
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("target", [[9.0, 0.5, -0.4], [0.2, 0.5, -8.0], [3.3, 0.5, -9.0], [3.1, 0.5, 5.0]])
+def test_a_start_is_read_within_half_a_turn_where_its_target_is_beyond_and_else_near_it(target, frame):
+    for start in (np.array([3.0, 0.4, 2.9]), np.array([-3.0, 0.4, -2.9])):
+        rotation = scipys("xyz", frame, start)
+        found = angles_to_count_from(rotation, "xyz", frame, target)
+        np.testing.assert_allclose(scipys("xyz", frame, found), rotation, atol=1e-12)
+        far = np.abs(target) > np.pi
+        assert (np.abs(found)[far] <= np.pi + 1e-9).all()
+        assert (np.abs(found - target)[~far] <= np.pi + 1e-9).all()
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("sequence", ["xyz", "zyz"])
+def test_of_both_triples_of_a_start_that_with_the_angles_nearest_to_those_within_half_a_turn_counts(
+    sequence, frame
+):
+    """How far a turn beyond half a turn begins from zero does not make the others tumble."""
+    start, target = np.array([0.0, 0.4, 2.97]), np.array([0.35, 0.4, 4.9])
+    for _ in range(2):  # the last angle, then the first one
+        rotation = scipys(sequence, frame, start)
+        np.testing.assert_allclose(angles_to_count_from(rotation, sequence, frame, target), start, atol=1e-12)
+        start, target = start[::-1], target[::-1]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("frame", FRAMES)
+def test_half_a_turn_at_a_start_is_on_the_side_of_the_target(sign, frame):
+    rotation = scipys("xyz", frame, [0.0, 0.4, np.pi])
+    for noise in (0.0, 1e-12, -1e-12):
+        turned = scipys("xyz", frame, [0.0, 0.4, np.pi + noise])
+        found = angles_to_count_from(turned, "xyz", frame, [0.1, 0.4, sign * 5.0])
+        np.testing.assert_allclose(found, [0.0, 0.4, sign * np.pi], atol=1e-9)
+    np.testing.assert_allclose(scipys("xyz", frame, found), rotation, atol=1e-11)
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_a_start_at_the_lock_has_nothing_of_the_side_in_it(frame):
+    rotation = scipys("zyz", frame, [0.0, 0.0, 0.8])
+    kept, other = (0, 2) if frame == "current" else (2, 0)
+    target = np.zeros(3)
+    target[kept] = 4.0
+    found = angles_to_count_from(rotation, "zyz", frame, target)
+    assert found[kept] == 0.0
+    assert found[other] == pytest.approx(0.8, abs=1e-12)
 
 
 def test_what_does_not_fit_is_refused():
+    with pytest.raises(InputError, match="finite triples"):
+        EulerInterpolation(np.zeros((2, 2)), SegmentProgress.even(1.0), "xyz")
     with pytest.raises(InputError, match="'xxy' is no sequence"):
         euler_between([0, 0, 0], [1, 1, 1], "xxy")
     with pytest.raises(InputError, match="1 segments need 2 orientations, not 3"):

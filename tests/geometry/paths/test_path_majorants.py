@@ -21,7 +21,7 @@ from trajcli.geometry.paths.pose import PoseCurve, Screw
 from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot
 from trajcli.geometry.pose import build
 from trajcli.geometry.power_series import growth
-from trajcli.geometry.rotation import exp
+from trajcli.geometry.rotation import Frame, exp
 from trajcli.kinematics.following.weave import Weave
 
 ORDER, DURATION = 9, 0.4
@@ -147,8 +147,17 @@ def test_a_helix_turns_and_climbs() -> None:
 
     near(bounds(ARC.majorants)[0], helix)
     near(bounds(ARC.majorants)[1], turn(angle))
+    down = Arc(ARC.start, ARC.center, ARC.axis, ARC.angle, -ARC.pitch)
+    np.testing.assert_array_equal(bounds(down.majorants), bounds(ARC.majorants))
     tangent = TangentOrientation(ARC, np.eye(3))
     np.testing.assert_array_equal(bounds(tangent.majorant), bounds(ARC.majorants)[1])
+
+
+def test_a_steep_helix_climbs_faster_than_it_turns() -> None:
+    radius, climb = 1e-3, 2.0 / (2 * np.pi)
+    angle = 1 / float(np.hypot(radius, climb))
+    steep = Arc(np.array([radius, 0, 0]), np.zeros(3), Z, 4.0, 2.0)
+    near(bounds(steep.majorants)[0], lambda s: [radius * cis(angle * s), climb * angle * s], within=1000.0)
 
 
 def test_a_screw_is_a_helix_about_its_axis() -> None:
@@ -180,8 +189,18 @@ def test_rotations_turn_by_their_angles() -> None:
     assert (bounds(euler.majorant) >= largest(turn(0.4))).all()
 
 
+@pytest.mark.parametrize(("middle", "last"), [(0.0, 1.0), (np.pi, -1.0)])
+@pytest.mark.parametrize("frame", ["current", "fixed"])
+def test_angles_about_one_axis_turn_by_their_sum(middle: float, last: float, frame: Frame) -> None:
+    """With s = t by exp(2 i t), whose Taylor coefficients are 2^m / m!: of opposite signs, too, where z is reversed."""
+    curve = euler_between([0.0, middle, 0.0], [1.0, middle, last], "ZYZ", frame, length=1.0)
+    found = curve.majorant(np.array([0.5]), np.eye(1, 5, 1)[0][:, None])
+    np.testing.assert_allclose(found[1:, 0], [2**m / factorial(m) for m in range(1, 5)], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
-    ("border", "half"), [(0.55, 0.2), (0.5, 0.3), (0.9, 0.1), (0.9, 0.0), (0.3, 0.1), (0.3, 0.0)]
+    ("border", "half"),
+    [(0.55, 0.2), (0.5, 0.3), (0.66, 0.17), (0.9, 0.1), (0.9, 0.0), (0.3, 0.1), (0.3, 0.0)],
 )
 def test_one_rotation_fades_into_the_next_one(border: float, half: float) -> None:
     """Both about z, by 1.2 rad over the first segment and by 0.7 rad over the second one."""

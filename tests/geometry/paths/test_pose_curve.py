@@ -171,6 +171,11 @@ def test_place_and_orientation_must_be_as_long():
         with pytest.raises(ValueError, match=rf"differ in length: 3.0, {length}"):
             PoseCurve(Line([0, 0, 0], [1, 2, 2]), FixedOrientation(np.eye(3), length))
     assert PoseCurve(Line([0, 0, 0], [1, 2, 2]), FixedOrientation(np.eye(3), 3.0 + 1e-12)).length == 3.0
+    for length in (1e-5, 1e5):
+        line = Line([0, 0, 0], [length, 0, 0])
+        assert PoseCurve(line, FixedOrientation(np.eye(3), length * (1 + 1e-10))).length == length
+        with pytest.raises(ValueError, match="differ in length"):
+            PoseCurve(line, FixedOrientation(np.eye(3), length * (1 + 1e-8)))
 
 
 @pytest.mark.parametrize(("apart", "breaks"), [(1e-12, 1), (1e-7, 2)])

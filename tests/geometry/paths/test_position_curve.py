@@ -7,7 +7,7 @@ from curve_laws import attitude_is_kept, keeps_the_laws_of_a_place, keeps_the_la
 from trajcli.errors import InputError, PlanningError
 from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.chain import join
-from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot, nearest
+from trajcli.geometry.paths.position import Line, PartOfCurve, Pivot, nearest, shown_vector
 
 
 def test_a_line_goes_straight_from_end_to_end():
@@ -52,6 +52,28 @@ def test_what_lies_outside_is_refused_and_rounding_is_not():
     assert line.evaluate(np.empty(0))[0].shape == (0, 3)
 
 
+@pytest.mark.parametrize("length", [1e-3, 1e3])
+def test_rounding_is_a_part_of_the_length(length):
+    line = Line([0, 0, 0], [0, 0, length])
+    np.testing.assert_array_equal(line.evaluate(length * np.array([-5e-10, 1 + 5e-10]))[0][:, 2], [0, length])
+    for share in (-2e-9, 1 + 2e-9):
+        with pytest.raises(ValueError, match="leaves the curve"):
+            line.evaluate(np.array([share * length]))
+
+
+def test_a_point_of_a_line_is_its_own_and_stays():
+    given = np.zeros(3)
+    line = Line(given, [1, 0, 0])
+    given[0] = 5.0
+    with pytest.raises(ValueError, match="read-only"):
+        line.start[0] = 5.0
+    assert line.length == 1
+
+
+def test_zero_has_no_sign_in_a_message():
+    assert shown_vector(np.array([-0.0, 1.0, 0.0])) == shown_vector(np.array([0.0, 1.0, -0.0]))
+
+
 def test_a_stretch_is_a_part_of_the_whole():
     part = PartOfCurve(Line([0, 0, 0], [2, 0, 0]), 0.5, 1.25)
     assert part.length == 0.75
@@ -80,6 +102,13 @@ def test_a_part_of_a_chain_begins_a_transport_of_its_own():
         own = part.transport(part.breaks, side)
         np.testing.assert_allclose(own[0] @ before, turned[0], rtol=0, atol=1e-14)
         np.testing.assert_array_equal(own[1], turned[1])
+    assert rounded.breaks.size
+    assert not PartOfCurve(rounded, 0.0, rounded.length).stops.size
+    before, behind = PartOfCurve(sharp, 0.0, corner[0]), PartOfCurve(sharp, corner[0], sharp.length)
+    short = PartOfCurve(sharp, 0.0, 0.9 * corner[0])
+    assert not [*before.breaks, *before.stops, *short.breaks, *short.stops]
+    np.testing.assert_array_equal(behind.breaks, sharp.breaks[1:] - corner[0])
+    np.testing.assert_allclose(behind.transport(np.zeros(1))[0][0], np.eye(3), rtol=0, atol=1e-15)
     rising = np.ones((4, 2))
     for own, whole in zip(
         part.majorants(np.array([0.1, 0.9]), rising),

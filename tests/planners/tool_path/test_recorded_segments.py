@@ -10,7 +10,7 @@ from trajcli.errors import FileError, TrajcliError
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.forward import forward
-from trajcli.planners.tool_path.segments import merged_events
+from trajcli.planners.tool_path.segments import merged_events, segments_from
 from trajcli.planning.plan import plan_job
 
 START = [0.4, 0.1, 0.3]
@@ -178,6 +178,37 @@ def test_what_is_wrong_with_a_file_is_said_at_its_line(tmp_path, text, segments,
     (problem,) = caught.value.problems
     assert message in problem.message
     assert problem.place is not None
+
+
+@pytest.mark.parametrize(
+    ("segments", "key"),
+    [
+        ({"csv": "poses.csv", "in": "tabel", "merge": 1e-3}, "in"),
+        ({"csv": "poses.csv", "in": "world", "merge": -1}, "merge"),
+        ({"csv": "poses.csv", "file": 1, "merge": 1e-3}, "file"),
+        ({"csv": 3, "merge": 1e-3}, "csv"),
+    ],
+)
+def test_what_is_wrong_with_a_key_is_said_at_its_line(tmp_path, segments, key):
+    with pytest.raises(TrajcliError) as caught:
+        job(tmp_path, HEADER + rows(), segments)
+    (problem,) = caught.value.problems
+    lines = (tmp_path / "job.yaml").read_text().splitlines()
+    assert problem.place is not None
+    assert lines[problem.place.line - 1].strip().startswith(f"{key}:")
+
+
+@pytest.mark.parametrize("frame", [{}, {"in": "table"}])
+def test_near_poses_are_left_out_in_a_frame_too(tmp_path, frame):
+    """Each third one of poses that are 0.4 mm apart stays; the first one counts as where the arm stands."""
+    text = "x,y,z\n" + "".join(f"{0.4 + 4e-4 * k},0.1,0.3\n" for k in range(1, 7))
+    recorded = {"csv": "poses.csv", "merge": 1e-3, **frame}
+    loaded = job(tmp_path, text, recorded, frames={"table": {"rpy": [0, 0, 0]}})
+    before = np.eye(4)
+    before[:3, 3] = START
+    segments, (event,) = segments_from(loaded.job.moves[0].segments, before)
+    np.testing.assert_allclose([each.line.xyz[0] for each in segments], [0.4012, 0.4024], atol=1e-12)
+    assert event.message.startswith("left out 3 of 6 poses")
 
 
 def test_poses_need_a_radius_as_lines_do(tmp_path):

@@ -147,7 +147,7 @@ class Arc(Smooth):
             raise _not_equidistant(a, c, b, middle)
         z = _shorter_axis(a - middle, b - middle) if axis is None else _across(axis, unit, distance)
         foot = middle + ((a - middle) @ z) * z  # where the constructor, too, will move the center
-        return cls(a, middle, z, _turned(a - foot, b - foot, z), moved=abs(aside))
+        return cls(a, middle, z, _turned(a - foot, b - foot, z), moved=aside)
 
     @cached_property
     def radius(self) -> float:

@@ -21,6 +21,7 @@ _TURN = 2.0 * np.pi
 _DIGITS = 9  # to which two triples must differ before one is nearer
 _HALF = 1e-9  # rad: half a turn is not beyond half a turn
 _LEAN = 1e-6  # rad
+_LITTLE = 1e-3  # weight of angles beyond half a turn
 _TYPED = 1e-6  # of an entry of a matrix: an arm stands where typed angles say, as near as its joints tell
 _MET = 1e-10  # of an entry of a matrix, by which a rotation is still met
 
@@ -105,9 +106,7 @@ def euler_interpolation(
     Raises:
         InputError: When the sequence is none, or the numbers of things do not fit.
     """
-    given = [
-        None if row is None else np.asarray(row, dtype=np.float64) for row in typed or [None] * len(rotations)
-    ]
+    given = typed or [None] * len(rotations)
     if len(given) != len(rotations):
         raise InputError(f"{len(rotations)} orientations and {len(given)} triples of angles do not fit")
     anchor = max((n for n, row in enumerate(given) if row is not None), default=len(rotations) - 1)
@@ -149,22 +148,25 @@ def angles_to_count_from(
         return np.asarray(typed, dtype=np.float64)
     aim = np.asarray(target, dtype=np.float64)
     far = np.abs(aim) > np.pi + _HALF
-    angles, locked = nearest_angles(rotation, sequence, frame, np.where(far, 0.0, aim))
+    weight = np.where(far, _LITTLE, 1.0)
+    angles, locked = nearest_angles(rotation, sequence, frame, np.where(far, 0.0, aim), weight)
     if locked:
         return angles
     # half a turn at the start is on the side of the target, whatever rounding says
-    return nearest_angles(rotation, sequence, frame, np.where(far, np.copysign(_LEAN, aim), aim))[0]
+    return nearest_angles(rotation, sequence, frame, np.where(far, np.copysign(_LEAN, aim), aim), weight)[0]
 
 
-def nearest_angles(rotation: Array, sequence: str, frame: Frame, aim: Array) -> tuple[Array, bool]:
+def nearest_angles(
+    rotation: Array, sequence: str, frame: Frame, aim: Array, weight: Array | float = 1.0
+) -> tuple[Array, bool]:
     """Return the angles (3,), rad, of a rotation (3, 3) nearest to `aim` (3,), and whether they lock."""
     read = euler_from_matrix(sequence, rotation, frame)
     candidates = [read.angles, read.alternative]
     if read.singular:
         candidates = [_split(row, int(read.lock), rotation, sequence, frame, aim) for row in candidates]
     candidates = [row + _TURN * np.round((aim - row) / _TURN) for row in candidates]
-    best = min(candidates, key=lambda row: round(float(np.abs(row - aim).max()), _DIGITS))
-    return np.asarray(best), bool(read.singular)
+    best = min(candidates, key=lambda row: round(float((weight * np.abs(row - aim)).max()), _DIGITS))
+    return best, bool(read.singular)
 
 
 def _split(angles: Array, lock: int, rotation: Array, sequence: str, frame: Frame, aim: Array) -> Array:

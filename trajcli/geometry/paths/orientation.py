@@ -117,10 +117,9 @@ class OverSegments(ABC):
     @property
     def stops(self) -> Array:
         """Borders without a blend at which the rate jumps."""
-        sharp: Array = self.progress.borders[1:-1][self.progress.half_widths == 0.0]
-        if not sharp.size:
-            return sharp
-        return np.asarray(sharp[_differ(self.evaluate(sharp, "left")[1], self.evaluate(sharp, "right")[1])])
+        sharp = self.progress.borders[1:-1][self.progress.half_widths == 0.0]
+        left, right = self.evaluate(sharp, "left")[1], self.evaluate(sharp, "right")[1]
+        return np.asarray(sharp[_differ(left, right)])
 
     @property
     def jumps(self) -> Array:
