@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import reduce
 from typing import Any, Literal
@@ -27,7 +27,6 @@ from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
 from trajcli.trajectory import MoveInterval, ViaPoints
 
 _SAMPLES = 513  # of a zone, at which its distances are looked at
-_EACH = 8  # each of how many of them is looked at first for distances from the path
 _KEPT = 16  # intervals of the path to its corner, and from there, that pictures show
 _DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
 _OF_PATHS = ("merged", "moved_center", "shrunk", "jerk_limit_both_ways")  # events, not of a law
@@ -116,7 +115,7 @@ def _flown_zone(chain: FlownChain, k: int, part: FlownPart, begun: float) -> Flo
         times = np.append(np.linspace(curve.start, curve.end, _SAMPLES), time)
         joints = curve.evaluate(times)
         distance, angle = around.offsets(joints)
-        off = _off_path(robot, joints, programmed)
+        off = _off_path(robot, curve, programmed)
         tool = float(distance.min()), float(distance.max()), off, float(angle.max())
     return FlownZone(
         number=k + 1,
@@ -168,10 +167,15 @@ def nearest_time(around: ZoneAround, curve: PiecewisePolynomial) -> float:
             return around.offsets(joints)[0]
         return np.asarray(np.linalg.norm((joints - around.corner) / around.joint_sizes, axis=1))
 
+    return _least_at(distances, curve)
+
+
+def _least_at(values: Callable[[Array], Array], curve: PiecewisePolynomial) -> float:
+    """Return when a value is least in a motion, not quite at its ends: ever closer to the least sample."""
     low, high = curve.start, curve.end
     for _ in range(4):
         times = np.linspace(low, high, 65)
-        index = int(distances(times).argmin())
+        index = int(values(times).argmin())
         low, high = float(times[max(index - 1, 0)]), float(times[min(index + 1, 64)])
     inset = 1e-6 * curve.duration
     return min(max(0.5 * (low + high), curve.start + inset), curve.end - inset)
@@ -184,20 +188,16 @@ def _programmed(courses: Sequence[Course], borders: tuple[float, float]) -> Arra
     return np.concatenate([before, behind[1:]])
 
 
-def _off_path(robot: Robot, joints: Array, programmed: Array) -> float:
-    """Return the largest distance of the tool from the programmed path, m.
-
-    Of the rows of joints in time some are looked at, and those about the farthest one.
-    """
+def _off_path(robot: Robot, curve: PiecewisePolynomial, programmed: Array) -> float:
+    """Return the largest distance of the tool from the programmed path, m."""
     path = forward(robot, programmed)[:, :3, 3]
-    here = forward(robot, joints)[:, :3, 3]
     starts, steps = path[:-1], np.diff(path, axis=0)
     squares = np.maximum(np.square(steps).sum(axis=1), np.finfo(np.float64).tiny)
-    coarse = _squares_to(here[::_EACH, None], starts, steps, squares)
-    middle = _EACH * int(coarse.argmax())
-    about = here[max(middle - _EACH, 0) : middle + _EACH + 1, None]
-    fine = _squares_to(about, starts, steps, squares)
-    return math.sqrt(max(float(coarse.max()), float(fine.max())))
+
+    def nearness(times: Array) -> Array:
+        return -_squares_to(forward(robot, curve.evaluate(times))[:, None, :3, 3], starts, steps, squares)
+
+    return math.sqrt(-nearness(np.array([_least_at(nearness, curve)]))[0])
 
 
 def _squares_to(positions: Array, starts: Array, steps: Array, squares: Array) -> Array:
@@ -237,17 +237,14 @@ def moves_as_flown(moves: Sequence[PlannedMove], chain: FlownChain) -> Iterator[
         number = chain.moves.index(move.index)
         curve, parts = pieces[number]
         end = state_at(curve, curve.end)
-        phases = tuple(_phases(parts))
-        events = tuple(event for event in move.planned.events if event.kind in _OF_PATHS)
-        continuity = move.planned.continuity
         planned = Planned(
             curve,
             end,
-            phases=phases,
-            events=events,
+            phases=tuple(_phases(parts)),
+            events=tuple(event for event in move.planned.events if event.kind in _OF_PATHS),
             via_points=_passed(chain, number, parts),
             wanted_speed=move.planned.wanted_speed,
-            continuity=continuity,
+            continuity=move.planned.continuity,
             parts=parts,
         )
         robot = reduce(with_looser_limits, robots[max(number - 1, 0) : number + 2], move.robot)

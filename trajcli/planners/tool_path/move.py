@@ -303,11 +303,9 @@ def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:
         }
         raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
     configuration = planned.configuration
-    if configuration is None:
-        return
-    if configuration.flags is not None:
+    wanted = {} if configuration is None else configuration.branch_names
+    if configuration is not None and configuration.flags is not None:
         configuration.flags.require(robot, end)
-    wanted = configuration.branch_names
     if not wanted:
         return
     from trajcli.kinematics.inverse.pinned_joints import solve_pinned

@@ -1,0 +1,201 @@
+"""What zones came to, against the motion of a planar arm by textbook formulas, on dense rows."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from trajcli.job.read import job_from_text
+from trajcli.planners.flying_by.flown_moves import FlownZone, zone_events
+from trajcli.planning.plan import Plan, plan_job
+
+LIMITS = {
+    "velocity": [[-1.0, 3.0], [-3.0, 0.5]],
+    "acceleration": [[-2.0, 8.0], [-8.0, 3.0]],
+    "jerk": 60.0,
+}
+PLACES = np.array([[0.3, 1.2], [0.9, 1.25], [1.0, 2.0], [1.0, 2.0], [0.2, 0.4], [0.6, 0.1]])
+SIZE = 0.02
+ZONES: dict[str, Any] = {
+    "position": SIZE,
+    "joints": {"joints": [0.03, 0.06]},
+    "orientation": {"orientation": 0.05},
+}
+
+
+def to(place: np.ndarray, **fields: Any) -> dict[str, Any]:
+    return {"planner": "jerk_limited", "to": {"joints": place.tolist()}, **fields}
+
+
+@cache
+def plan(zone: str = "position", **fields: Any) -> Plan:
+    """Return a plan of two chains with a hold between them, the second move of no length among them."""
+    first, second, third, fourth, fifth = (to(place) for place in PLACES[1:])
+    moves = [first, second, third, fourth, {"planner": "hold", "duration": 0.25}, fifth, to(PLACES[0])]
+    job = {"version": 1, "robot": "planar2r", "limits": LIMITS, "start": {"joints": PLACES[0].tolist()}}
+    return plan_job(
+        job_from_text(json.dumps({**job, "zone": ZONES.get(zone, zone), **fields, "moves": moves}))
+    )
+
+
+def tool(q: np.ndarray) -> np.ndarray:
+    """Return where the tool is, m, and its angle, rad, (N, 3)."""
+    both = q.sum(axis=-1)
+    return np.stack(
+        [
+            0.3 * np.cos(q[..., 0]) + 0.2 * np.cos(both),
+            0.3 * np.sin(q[..., 0]) + 0.2 * np.sin(both),
+            both,
+        ],
+        axis=-1,
+    )
+
+
+def away_from(path: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return how far places (N, 2) are from the nearest one of a path (m, 2), (N,)."""
+    return np.array([np.linalg.norm(path - place, axis=1).min() for place in places])
+
+
+FLOWN = [
+    (0, PLACES[0], PLACES[1], PLACES[2]),
+    (1, PLACES[1], PLACES[2], PLACES[4]),
+    (5, PLACES[4], PLACES[5], PLACES[0]),
+]
+
+
+@pytest.mark.parametrize("name", ["position", "joints", "orientation"])
+def test_what_is_said_of_a_zone_is_what_rows_in_it_show(name: str) -> None:
+    made = plan(name)
+    assert made.flyby is not None
+    zones, curve = made.flyby.zones, made.trajectory.curve
+    assert [zone.number for zone in zones] == [1, 2, 3]
+    assert [zone.move for zone in zones] == [move for move, *_ in FLOWN]
+    for zone, (_, before, corner, behind) in zip(zones, FLOWN, strict=True):
+        times = np.linspace(zone.entered, zone.left, 20_001)
+        q = curve.evaluate(times)
+        here, there = tool(q), tool(corner)
+        distance, turn = np.linalg.norm(here[:, :2] - there[:2], axis=1), np.abs(here[:, 2] - there[2])
+        assert zone.nearest == pytest.approx(distance.min(), abs=1e-7)
+        assert zone.farthest == pytest.approx(distance.max(), rel=1e-6)
+        assert zone.turn == pytest.approx(turn.max(), rel=1e-6)
+        assert zone.passed == pytest.approx(times[distance.argmin()], abs=2 * (times[1] - times[0]))
+        ends = q[[0, -1]]
+        for end, other in zip(ends, (before, behind), strict=True):  # the borders are on the programmed lines
+            way, off = corner - other, end - other
+            assert abs(way[0] * off[1] - way[1] * off[0]) < 1e-8
+        shares = {
+            "position": distance[[0, -1]] / SIZE,
+            "orientation": turn[[0, -1]] / 0.05,
+            "joints": (np.abs(ends - corner) / [0.03, 0.06]).max(axis=1),
+        }[name]
+        assert zone.of == name
+        assert zone.used / zone.asked == pytest.approx(shares.min(), rel=1e-6)
+        lines = [np.linspace(a, corner, 4001) for a in (ends[0], ends[1])]
+        path = tool(np.concatenate(lines))[:, :2]
+        most = 50 * int(away_from(path, here[::50, :2]).argmax())
+        off = away_from(path, here[max(most - 50, 0) : most + 50, :2]).max()
+        assert zone.deviation == pytest.approx(off, rel=1e-4)  # of rows 0.02 % of a zone apart
+
+
+def test_of_a_zone_of_joints_the_one_that_uses_most_of_its_size_is_named() -> None:
+    made = plan("joints")
+    assert made.flyby is not None
+    for zone in made.flyby.zones:
+        ends = made.trajectory.curve.evaluate(np.array([zone.entered, zone.left]))
+        corner = PLACES[{0: 1, 1: 2, 5: 5}[zone.move]]
+        shares = np.abs(ends - corner) / [0.03, 0.06]
+        nearer = shares.max(axis=1).argmin()
+        assert zone.joint is not None
+        assert shares[nearer, zone.joint] == pytest.approx(shares[nearer].max(), rel=1e-9)
+        assert zone.asked == (0.03, 0.06)[zone.joint]
+        assert zone.used == pytest.approx(np.abs(ends - corner)[nearer, zone.joint], rel=1e-9)
+        assert zone.ball(made.moves[0].robot) is None
+
+
+def test_the_limit_of_which_a_zone_uses_most_counts_by_its_direction() -> None:
+    made = plan()
+    assert made.flyby is not None
+    for zone in made.flyby.zones:
+        times = np.linspace(zone.entered, zone.left, 20_001)[1:-1]
+        used = {}
+        for order, name in enumerate(("velocity", "acceleration", "jerk"), 1):
+            rows = made.trajectory.curve.evaluate(times, order)
+            bounds = np.broadcast_to([[-60.0, 60.0]] * 2 if name == "jerk" else LIMITS[name], (2, 2))
+            share = np.maximum(rows / bounds[:, 1], rows / bounds[:, 0]).max(axis=0)
+            used |= {f"{name} of j{joint}": value for joint, value in enumerate(share, 1)}
+        assert used[zone.binds] == pytest.approx(max(used.values()), rel=1e-4)
+
+
+def test_pictures_of_a_zone_are_about_its_corner() -> None:
+    made = plan()
+    assert made.flyby is not None
+    robot = made.moves[0].robot
+    for zone, (_, _, corner, _) in zip(made.flyby.zones, FLOWN, strict=True):
+        ball = zone.ball(robot)
+        assert ball is not None
+        np.testing.assert_allclose(ball, [*tool(corner)[:2], 0.0, zone.used], atol=1e-9)
+        path = zone.tool_path(robot)
+        ends = tool(made.trajectory.curve.evaluate(np.array([zone.entered, zone.left])))[:, :2]
+        np.testing.assert_allclose(path[[0, -1], :2], ends, atol=1e-7)
+        assert np.linalg.norm(path[:, :2] - tool(corner)[:2], axis=1).min() < 1e-9
+
+
+def test_moves_change_where_the_tool_is_nearest_and_their_parts_are_in_turns() -> None:
+    made = plan()
+    assert made.flyby is not None
+    spans = {span.index: span for span in made.trajectory.spans}
+    assert spans[2].start == spans[2].end  # the move of no length
+    for zone in made.flyby.zones:
+        assert spans[zone.move].end == pytest.approx(zone.passed, abs=1e-6)
+    first, second = made.moves[0].planned, made.moves[1].planned
+    assert [phase.name for phase in first.phases] == ["along the path", "within the zone"]
+    assert [phase.name for phase in second.phases] == ["within the zone", "along the path", "within the zone"]
+    for move in made.moves:
+        ends = [0.0, *(phase.end for phase in move.planned.phases)]
+        if move.planned.parts:
+            assert [phase.start for phase in move.planned.phases] == ends[:-1]
+        if move.planned.parts and ends[-1]:
+            assert ends[-1] == move.planned.curve.end
+
+
+def test_what_flying_by_gains_is_counted_from_the_same_job_with_stops() -> None:
+    made, stopping = plan(), plan("stop")
+    assert made.flyby is not None
+    assert made.flyby.stopping == pytest.approx(stopping.trajectory.duration, rel=1e-12)
+    assert made.flyby.duration == pytest.approx(made.trajectory.duration, rel=1e-12)
+    assert made.flyby.searched <= made.flyby.duration < made.flyby.stopping
+    assert made.flyby.chains is not None
+    assert [chain.moves for chain in made.flyby.chains] == [(0, 1, 3), (5, 6)]
+    left = 0.25 + sum(chain.duration for chain in made.flyby.chains)
+    assert left == pytest.approx(made.flyby.duration, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("share", "shares", "kinds"),
+    [
+        (1.0, (1.0, 1.0, 1.0), []),
+        (1 - 1e-9, (1.0, 1.0, 1.0), []),
+        (0.7, (1.0, 1.0, 1.0), ["shrunk"]),
+        (1.0, (1.0, 0.5, 0.25), ["lowered"]),
+        (0.5, (0.5, 1.0, 1.0), ["shrunk", "lowered"]),
+    ],
+)
+def test_what_a_zone_concedes_is_said(share: float, shares: tuple[float, ...], kinds: list[str]) -> None:
+    made = plan()
+    assert made.flyby is not None
+    zone = made.flyby.zones[1]
+    fields = {name: getattr(zone, name) for name in FlownZone.__dataclass_fields__}
+    changed = FlownZone(**{**fields, "asked": 0.02, "used": 0.02 * share, "shares": shares})
+    events = list(zone_events([changed], ["j1", "j2"]))
+    assert [event.kind for event in events] == kinds
+    assert [event.move for event in events] == [zone.move] * len(kinds)
+    if "lowered" in kinds:
+        names = ("velocity", "acceleration", "jerk")
+        parts = [f"{part:g} of the {name}" for part, name in zip(shares, names, strict=True) if part < 1]
+        assert f"at most {' and '.join(parts)} that" in events[-1].message
+    if "shrunk" in kinds:
+        assert f"{share:.3g} of the" in events[0].message
