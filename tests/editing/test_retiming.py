@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from math import sqrt
 from pathlib import Path
@@ -18,7 +19,11 @@ from trajcli.editing.retiming import Stretch, retime
 from trajcli.editing.writing import as_read, write_motion
 from trajcli.errors import InputError, VerificationError
 from trajcli.job.read import job_from_text
+from trajcli.job.robot import load_robot
 from trajcli.judge.file import CheckOptions, check_file
+from trajcli.judge.motion import Requirements
+from trajcli.judge.recorded_tool import ToolJudge
+from trajcli.kinematics.robot import Robot
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import plan_job
 from trajcli.streams.decimals import Digits
@@ -245,8 +250,10 @@ output: {rate: 50, columns: [t, q, qd, qdd, move]}
     assert held[-1] - held[0] == pytest.approx(0.4 - 1 / 50)
 
 
-def test_moves_that_meet_in_motion_share_a_factor(tmp_path: Path) -> None:
-    job = JOB.replace("joints: [30, -20]}", "joints: [30, -20], velocity: [20, 0]}")
+@pytest.mark.parametrize("velocity", ["[20, 0]", "[-20, 0]", "[0, -20]"])
+def test_moves_that_meet_in_motion_share_a_factor(velocity: str, tmp_path: Path) -> None:
+    """Whichever joint moves, and whatever way."""
+    job = JOB.replace("joints: [30, -20]}", f"joints: [30, -20], velocity: {velocity}}}")
     source = planned(tmp_path / "rows.csv", job)
     arm = tmp_path / "arm.yaml"
     arm.write_text("units: {angle: deg}\njoints: [{name: base, velocity: 20}, {name: arm}]\n")
@@ -374,3 +381,147 @@ def test_the_goal_of_an_ur_that_is_within_its_limit_at_its_points_only(ending: s
 def test_limits_are_of_a_job_or_of_a_robot(names: tuple[str | None, str | None]) -> None:
     with pytest.raises(InputError, match=r"limits|exclude"):
         kept_limits(*names)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_faster_motion_takes_nothing_of_its_rounding(sign: int, tmp_path: Path) -> None:
+    """Velocities of three decimals: the largest that is written is at its limit, in either direction."""
+    t = np.arange(101) / 100
+    q, qd, *_ = quintic(t, float(sign), 1.0)
+    lines = (f"{a:.2f},{b:.5f},{c:.3f}\n" for a, b, c in zip(t, q, qd, strict=True))
+    source = tmp_path / "rows.csv"
+    source.write_text("t,q1,qd1\n" + "".join(lines))
+    bounds = "[-2.5, 9]" if sign < 0 else "[-9, 2.5]"
+    _, stretch = retimed(source, robot(tmp_path / "arm.yaml", f"velocity: {bounds}"), fastest=True)
+    assert 1 - 1e-6 <= stretch.factor / (1.875 / 2.5) < 1.003
+
+
+@pytest.mark.parametrize("begin", [-5.0, 0.0, 1.7e9])
+def test_a_factor_does_not_depend_on_when_a_motion_begins(begin: float, tmp_path: Path) -> None:
+    """Stamps of a clock have few digits left, and the motion is as fast as before; it begins when it did."""
+    arm = robot(tmp_path / "arm.yaml", "velocity: 2.5, acceleration: 8, jerk: 100")
+    motion = read_motion(str(rows_of(tmp_path / "rows.csv")), ReadingOptions())
+    later = replace(motion, rows=replace(motion.rows, t=motion.rows.t + begin))
+    found, (stretch,) = retime(later, kept_limits(None, str(arm)).requirements, fastest=True)
+    assert stretch.factor == pytest.approx(max(1.875 / 2.5, (PEAKS[1] / 8) ** 0.5, 0.6 ** (1 / 3)), rel=2e-4)
+    assert found.rows.t[0] == begin
+    assert found.rows.t[-1] - begin == pytest.approx(stretch.factor, abs=1e-6)
+
+
+@pytest.mark.parametrize("limits", ["velocity: 1, acceleration: 2", "effort: 3"])
+def test_what_stands_still_has_no_fastest_time(limits: str, tmp_path: Path) -> None:
+    source = tmp_path / "rows.csv"
+    source.write_text("t,q1\n0,1\n1,1\n2,1\n")
+    with pytest.raises(InputError, match="no limit bounds how fast"):
+        retimed(source, robot(tmp_path / "arm.yaml", limits), fastest=True)
+
+
+def test_a_move_of_one_joint_travels_and_noise_of_the_last_decimal_does_not(tmp_path: Path) -> None:
+    """The first and the third of three moves are of one joint; in the second a last digit comes and goes."""
+    names = ("a", "b")
+    arm = tmp_path / "arm.yaml"
+    arm.write_text(f"joints: [{{name: {names[0]}, velocity: 10}}, {{name: {names[1]}, velocity: 10}}]\n")
+    source = tmp_path / "rows.csv"
+    points = [(0, 0, 0), (1, 0, 0), (1, 0.001, 1), (1, 0, 1), (1, 0, 2), (1, 2, 2)]
+    source.write_text(
+        "t,a,b,move\n" + "".join(f"{k},{a:.3f},{b:.3f},{m}\n" for k, (a, b, m) in enumerate(points))
+    )
+    motion = read_motion(str(source), ReadingOptions(units="rad"), joints=names)
+    _, stretches = retime(motion, kept_limits(None, str(arm)).requirements, fastest=True, per_move=True)
+    assert [stretch.moves for stretch in stretches] == [(0,), (1,), (2,)]
+    assert [stretch.factor for stretch in stretches] == pytest.approx([0.1, 1, 0.2], rel=1e-2)
+
+
+STILL = """\
+version: 1
+robot: fr3
+start: {joints: [0, -0.8, 0, -2.3, 0, 1.6, 0.8]}
+moves: [{planner: quintic, to: {joints: [0.1, -0.8, 0, -2.3, 0, 1.6, 0.8]}, duration: 2}]
+output: {rate: 50, columns: [t, q, qd, qdd]}
+"""
+
+
+def other_arm(arm: Robot, what: str) -> Robot:
+    """Return an arm with twice a limit of the first joint, another limit of the tool, or another tool."""
+    if what == "tool":
+        return replace(arm, tool=arm.tool + np.eye(4)[3] * 0.1)
+    if what == "tcp":
+        return replace(arm, limits=replace(arm.limits, tcp=replace(arm.limits.tcp, speed=0.3)))
+    changed = getattr(arm.limits, what).copy()
+    changed[0] *= 2
+    return replace(arm, limits=replace(arm.limits, **{what: changed}))
+
+
+@pytest.mark.parametrize("what", ["velocity", "jerk", "velocity_by_position", "effort", "tcp", "tool"])
+def test_moves_that_differ_in_anything_that_counts_are_to_be_named(what: str, tmp_path: Path) -> None:
+    """Rows that name no move have the limits of all, where these are the same; a tool counts with its limits."""
+    plain = load_robot("fr3")
+    limits = plain.limits
+    arm = replace(
+        plain,
+        limits=replace(limits, effort=np.full((7, 2), [-90.0, 90.0]), jerk=np.full((7, 2), [-9e3, 9e3])),
+    )
+    motion = read_motion(str(planned(tmp_path / "rows.csv", STILL)), ReadingOptions())
+    same = Requirements(arm, {0: arm, 1: replace(arm)})
+    _, (stretch,) = retime(motion, same)
+    assert stretch.factor == 1.0
+    with pytest.raises(InputError, match="whose moves differ in limits, tool or load"):
+        retime(motion, Requirements(arm, {0: arm, 1: other_arm(arm, what)}))
+
+
+def test_a_tool_counts_for_its_own_limits_without_efforts(tmp_path: Path) -> None:
+    arm = load_robot("fr3")
+    motion = read_motion(str(planned(tmp_path / "rows.csv", STILL)), ReadingOptions())
+    moves = {0: arm, 1: other_arm(arm, "tool")}
+    assert retime(motion, Requirements(arm, moves))[1][0].factor == 1.0
+    with pytest.raises(InputError, match="whose moves differ in limits, tool or load"):
+        retime(motion, Requirements(arm, moves, tool=lambda: ToolJudge(arm)))
+
+
+def coarse(path: Path, columns: str = "t,q1,qd1", decimals: int = 3) -> Path:
+    """Write a quintic over distance 1 in 1 s whose velocities have few decimals, and maybe efforts of 1 N m."""
+    t = np.arange(101) / 100
+    q, qd, *_ = quintic(t, 1.0, 1.0)
+    behind = ",1.0" if "tau" in columns else ""
+    lines = (f"{a:.2f},{b:.5f},{c:.{decimals}f}{behind}\n" for a, b, c in zip(t, q, qd, strict=True))
+    path.write_text(f"{columns}\n" + "".join(lines))
+    return path
+
+
+def test_what_is_over_by_its_rounding_alone_keeps_its_time(tmp_path: Path) -> None:
+    """The largest velocity that is written is 1.875, which may be 1.8746: neither faster nor slower is asked for."""
+    arm = robot(tmp_path / "arm.yaml", "velocity: 1.8748")
+    source = coarse(tmp_path / "rows.csv")
+    assert verdict(source, arm) == "within rounding"
+    for fastest in (False, True):
+        assert retimed(source, arm, fastest=fastest)[1].factor == 1.0
+
+
+def test_a_border_that_rests_as_far_as_decimals_tell_divides_moves(tmp_path: Path) -> None:
+    source, arm = tmp_path / "rows.csv", robot(tmp_path / "arm.yaml", "velocity: 20")
+    rows = ["0.0,0.00,0.000,0", "1.0,1.00,0.001,1", "2.0,-1.00,0.000,1"]
+    source.write_text("t,q1,qd1,move\n" + "\n".join(rows) + "\n")
+    motion, limits = read_motion(str(source), ReadingOptions()), kept_limits(None, str(arm))
+    _, stretches = retime(motion, limits.requirements, fastest=True, per_move=True)
+    assert [stretch.factor for stretch in stretches] == pytest.approx([1.5 / 20, 3 / 20], rel=1e-2)
+
+
+def test_what_is_written_of_a_retimed_motion_and_what_is_not(tmp_path: Path) -> None:
+    """Derivatives have the decimals of a plan, at least; efforts would be others, which a note says."""
+    arm = robot(tmp_path / "arm.yaml", "velocity: 1.5")
+    found, _ = retimed(coarse(tmp_path / "rows.csv", "t,q1,qd1,tau1"), arm)
+    written = {column.name: column.decimals for column in found.columns}
+    assert written == {"t": 9, "q1": 5, "qd1": 9}
+    assert any("efforts are left out" in note for note in found.notes)
+    finer, _ = retimed(coarse(tmp_path / "fine.csv", decimals=11), arm)
+    assert {column.name: column.decimals for column in finer.columns} == {"t": 9, "q1": 5, "qd1": 11}
+    assert not any("efforts" in note for note in finer.notes)
+
+
+def test_stamps_nearer_than_a_millisecond_have_more_decimals(tmp_path: Path) -> None:
+    """A hundred rows in 12.5 ms: nine decimals would change their velocities."""
+    arm = robot(tmp_path / "arm.yaml", "velocity: 150")
+    found, stretch = retimed(rows_of(tmp_path / "rows.csv"), arm, fastest=True)
+    assert stretch.factor == pytest.approx(1.875 / 150, rel=2e-4)
+    said = found.as_written().rows.t
+    np.testing.assert_allclose(said, np.arange(101) / 100 * stretch.factor, rtol=0, atol=6e-13)

@@ -243,3 +243,15 @@ def test_a_name_is_shown_where_its_own_column_is_named(separator, sign):
         begins += len(name) + 1
     whole = header.place()
     assert (whole.column, whole.length) == (1, len(text))
+
+
+@pytest.mark.parametrize("row", ['"1","2","x"', '"1",  "2" ,x', '1,2,"x"', '"x1x","2","x"', '1,"nan",3'])
+def test_a_wrong_cell_in_quotation_marks_is_shown_where_it_stands(tmp_path, row):
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, f'"t","q1","q2"\n"0","1","2"\n{row}\n')
+    place = caught.value.problems[0].place
+    cells = [cell.strip().strip('"') for cell in row.split(",")]
+    wrong = next(k for k, cell in enumerate(cells) if not cell.isdecimal())
+    begins = len(",".join(row.split(",")[:wrong])) + bool(wrong)
+    begins += len(row.split(",")[wrong]) - len(row.split(",")[wrong].lstrip(' "'))
+    assert (place.line, place.column - 1, place.length) == (3, begins, len(cells[wrong]))

@@ -198,11 +198,6 @@ def _whole(file: MotionFile) -> EditedMotion:
     rows = file.whole()
     if len(rows.t) < 2:
         raise InputError(f"{file.source} has {len(rows.t)} row, a motion has two at least")
-    for name in ("t", "q", "qd", "qdd", "qddd", "tau"):
-        values = getattr(rows, name)
-        if values is not None and not np.isfinite(values).all():
-            row = int(np.nonzero(~np.isfinite(values))[0][0]) + 1
-            raise InputError(f"{file.source}: row {row} holds a number of {name} that is not finite")
     late = np.flatnonzero(np.diff(rows.t) <= 0)
     if late.size:
         row, before, after = int(late[0]) + 2, rows.t[late[0]], rows.t[late[0] + 1]

@@ -182,11 +182,7 @@ class RowReader:
         """Return what is wrong with a line, what would fix it, and where; None where nothing is."""
         source, names = line.decode("utf-8", "replace"), self._header.names
         if '"' in source:
-            cells = list(
-                enumerate(
-                    (cell.decode("latin-1") for cell in self._split(layout.plain(line + b"\n")[:-1])), 1
-                )
-            )
+            cells = list(_found_in(source, self._split(layout.plain(line + b"\n")[:-1])))
         else:
             cells = layout.cells(source)
         if len(cells) != len(names):
@@ -207,6 +203,15 @@ class RowReader:
                 value = f"'{shown}'" if shown else "empty"
                 return f"{names[index]} is {value}, expected a finite number", None, place
         return None
+
+
+def _found_in(line: str, cells: Sequence[bytes]) -> Iterator[tuple[int, str]]:
+    """Yield the cells of a quoted line, each with its column, from 1."""
+    at = 0
+    for text in (cell.decode("latin-1") for cell in cells):
+        at = max(line.find(text, at), at)
+        yield at + 1, text
+        at += len(text)
 
 
 def _cells_of(
