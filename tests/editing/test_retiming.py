@@ -388,12 +388,12 @@ def test_a_faster_motion_takes_nothing_of_its_rounding(sign: int, tmp_path: Path
     """Velocities of three decimals: the largest that is written is at its limit, in either direction."""
     t = np.arange(101) / 100
     q, qd, *_ = quintic(t, float(sign), 1.0)
-    lines = (f"{a:.2f},{b:.5f},{c:.3f}\n" for a, b, c in zip(t, q, qd, strict=True))
+    lines = (f"{a:.2f},{b:.15f},{c:.3f}\n" for a, b, c in zip(t, q, qd, strict=True))
     source = tmp_path / "rows.csv"
     source.write_text("t,q1,qd1\n" + "".join(lines))
     bounds = "[-2.5, 9]" if sign < 0 else "[-9, 2.5]"
     _, stretch = retimed(source, robot(tmp_path / "arm.yaml", f"velocity: {bounds}"), fastest=True)
-    assert 1 - 1e-6 <= stretch.factor / (1.875 / 2.5) < 1.003
+    assert 1 - 1e-6 <= stretch.factor / (1.875 / 2.5) < 1 + 2e-4
 
 
 @pytest.mark.parametrize("begin", [-5.0, 0.0, 1.7e9])
@@ -519,9 +519,9 @@ def test_what_is_written_of_a_retimed_motion_and_what_is_not(tmp_path: Path) -> 
 
 
 def test_stamps_nearer_than_a_millisecond_have_more_decimals(tmp_path: Path) -> None:
-    """A hundred rows in 12.5 ms: nine decimals would change their velocities."""
-    arm = robot(tmp_path / "arm.yaml", "velocity: 150")
+    """A hundred rows in 14 ms: nine decimals would change their velocities."""
+    arm = robot(tmp_path / "arm.yaml", "velocity: 137")
     found, stretch = retimed(rows_of(tmp_path / "rows.csv"), arm, fastest=True)
-    assert stretch.factor == pytest.approx(1.875 / 150, rel=2e-4)
+    assert stretch.factor == pytest.approx(1.875 / 137, rel=2e-4)
     said = found.as_written().rows.t
     np.testing.assert_allclose(said, np.arange(101) / 100 * stretch.factor, rtol=0, atol=6e-13)

@@ -255,3 +255,81 @@ def test_a_wrong_cell_in_quotation_marks_is_shown_where_it_stands(tmp_path, row)
     begins = len(",".join(row.split(",")[:wrong])) + bool(wrong)
     begins += len(row.split(",")[wrong]) - len(row.split(",")[wrong].lstrip(' "'))
     assert (place.line, place.column - 1, place.length) == (3, begins, len(cells[wrong]))
+
+
+def test_a_line_without_an_end_is_no_table(tmp_path, monkeypatch):
+    monkeypatch.setattr(table, "_CHUNK", 48)
+    with pytest.raises(InputError, match="no table: it has a line of more than 65536 bytes"):
+        read(tmp_path, "t,q1\n" + "1," * 40_000)
+
+
+@pytest.mark.parametrize("chunk", [1 << 20, 48])
+def test_empty_lines_are_counted(tmp_path, monkeypatch, chunk):
+    monkeypatch.setattr(table, "_CHUNK", chunk)
+    for empty in (1, 60, 200):
+        place = f"in.csv:{2 + empty + 1}:3"
+        assert flaws(tmp_path, "t,q1\n" + "\n" * empty + "0,1\n1,x\n") == [
+            (place, "q1 is 'x', expected a finite number")
+        ]
+
+
+@pytest.mark.parametrize(
+    ("text", "cut"), [("0,1\n1,x", True), ("0,1\n1", True), ("0,1\n1,x\n", False), ("0,x\n1,2", False)]
+)
+def test_a_last_line_without_its_end_may_have_been_cut(tmp_path, text, cut):
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, f"t,q1\n{text}")
+    assert ("may have been cut" in (caught.value.problems[0].hint or "")) == cut
+
+
+def test_a_comma_in_quotation_marks_divides_nothing_and_is_not_lost(tmp_path):
+    assert flaws(tmp_path, 't,q1\n0,"1,5"\n')[0][1] == "q1 is '1,5', expected a finite number"
+    assert read(tmp_path, 't;q1\n0;"1,5"\n').columns.tolist() == [[0, 1.5]]
+
+
+HEADS = [  # lines before the rows, the names, the line of the first row
+    ("# made by hand\n# t,q1\n", ("t", "q1"), 3),
+    ("% t q1\n", ("t", "q1"), 2),
+    ("# made by hand\nt,q1\n", ("t", "q1"), 3),
+    ("# t,q1\n\n", ("t", "q1"), 3),
+    ("t,q1,\n", ("t", "q1"), 2),
+    ("t;q1;;\n", ("t", "q1"), 2),
+    ("t, of the clock;q1\n", ("t, of the clock", "q1"), 2),
+]
+
+
+@pytest.mark.parametrize(("head", "names", "line"), HEADS)
+def test_names_are_found_behind_comments_and_before_ends_without_any(tmp_path, head, names, line):
+    cells = ";" if ";" in head else ","
+    assert read(tmp_path, f"{head}0{cells}1.5\n").names == names
+    assert flaws(tmp_path, f"{head}0{cells}x\n") == [
+        (f"in.csv:{line}:3", "q1 is 'x', expected a finite number")
+    ]
+
+
+@pytest.mark.parametrize("name", ["1", "-1.5e3", ".5", "1,5"])
+def test_a_number_is_no_name(tmp_path, name):
+    text = f"t;{name};q1\n0;1;2\n"
+    assert flaws(tmp_path, text) == [("in.csv:1:3", f"{name} stands where a column's name should be")]
+
+
+@pytest.mark.parametrize("byte", [1, 8, 0x80, 0x9F])
+def test_bytes_of_no_letter_are_no_text(tmp_path, byte):
+    (said,) = flaws(tmp_path, b"t,q\xe9" + bytes([byte]) + b"\n0,1\n")
+    assert said.endswith("is not text")
+    assert read(tmp_path, b"t,q\xe9\n0,1\n").names == ("t", "q\xe9")
+
+
+@pytest.mark.parametrize("head", ["t,q1,q2", "t;q1;q2", "t q1 q2", "t\tq1\tq2"])
+@pytest.mark.parametrize(
+    "row", ["0,1.5,2", "0;1.5;2", "0;1,5;2", "0 1.5 2", "0\t1.5\t2", "0 \t1.5\t 2", "0;1.5;2;"]
+)
+def test_rows_may_be_separated_otherwise_than_names(tmp_path, head, row):
+    assert read(tmp_path, f"{head}\n{row}\n{row}\n").columns.tolist() == [[0, 1.5, 2]] * 2
+
+
+@pytest.mark.parametrize("row", ["0,1,2,3", "0;1;2;3", "0,1", "0,1,2,3,"])
+def test_a_number_too_many_is_not_left_out(tmp_path, row):
+    (flaw,) = flaws(tmp_path, f"t,q1,q2\n{row}\n")
+    assert flaw[0] == "in.csv:2:1"
+    assert "expected 3 as in line 1" in flaw[1]
