@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import os
 
 import numpy as np
 import pytest
 
 from trajcli.columns import columns_of
-from trajcli.errors import InputError
+from trajcli.errors import InputError, TrajcliError
 from trajcli.streams import formats
-from trajcli.streams.formats import DEFAULT, FORMATS, StreamFormat, format_of, write_verified
+from trajcli.streams.formats import DEFAULT, FORMATS, StreamFormat, WriteOptions, format_of, write_verified
 from trajcli.units import Units
 
 COLUMNS = columns_of(("t", "q"), ("revolute", "prismatic"), Units("deg", "mm"))
@@ -87,3 +88,51 @@ def test_a_format_that_is_asked_for_decides_what_a_name_leaves_open(tmp_path):
     with pytest.raises(InputError, match=r"--format ros contradicts the name of the file, a\.csv") as caught:
         format_of("a.csv", "ros")
     assert caught.value.problems[0].hint == "leave --format out, or name the file .yaml"
+
+
+def blocks():
+    """Return columns of a joint, and rows whose numbers have more than nine decimals."""
+    rows = np.stack([np.arange(5) / 10, np.arange(5) / 7, np.arange(5) / 3, np.arange(5) / 9], axis=1)
+    return columns_of(("t", "q", "qd", "qdd"), ("revolute",), Units()), rows
+
+
+def test_a_file_that_holds_something_else_does_not_appear(tmp_path):
+    """Whatever a writer makes of rows, they are read again, each block when it is written."""
+    columns, rows = blocks()
+
+    def damaged(options):
+        write, verify = FORMATS["csv"].functions(options)
+
+        def write_others(rows, columns, out):
+            kept = list(rows)
+            others = write([block + 1e-8 for block in kept], columns, out)
+            yield from (block for block, _ in zip(kept, others, strict=True))
+
+        return write_others, verify
+
+    for some in ([rows], [rows[:2], rows[2:]]):
+        with pytest.raises(TrajcliError):
+            write_verified(tmp_path / "a.csv", some, columns, form=StreamFormat("damaged", damaged))
+        assert not (tmp_path / "a.csv").exists()
+    write_verified(tmp_path / "a.csv", [rows], columns)
+    assert (tmp_path / "a.csv").exists()
+
+
+@pytest.mark.parametrize("name", ["csv", "jsonl", "npy", "npz"])
+def test_what_a_format_says_of_itself_is_so(name):
+    """Text can be decoded, and digits change what is written where nine decimals are few."""
+    columns, rows = blocks()
+    form, written = FORMATS[name], {}
+    for digits in ("fixed", "full"):
+        out = io.BytesIO()
+        form.write([rows], columns, out, WriteOptions(digits))
+        written[digits] = out.getvalue()
+    assert (written["fixed"] != written["full"]) == form.decimals
+    assert (b"\0" not in written["full"]) == form.text
+
+
+@pytest.mark.parametrize("name", ["mcap", "ros", "ros-goal"])
+def test_a_format_of_a_motion_is_not_written_of_a_table(name):
+    columns, rows = blocks()
+    with pytest.raises(TrajcliError, match="there is only a table"):
+        FORMATS[name].write([rows], columns, io.BytesIO(), WriteOptions())

@@ -207,7 +207,7 @@ def test_a_table_is_the_same_in_every_layout(tmp_path, monkeypatch, way, chunk):
     monkeypatch.setattr(table, "_CHUNK", chunk)
     generator = np.random.default_rng(7)
     rows = [
-        [str(k), f"{generator.normal():.{1 + k % 4}f}", f"{generator.normal():.3e}", str(-2.5 * (k % 3))]
+        [str(k), f"{generator.normal():.{4 - k % 4}f}", f"{generator.normal():.3e}", str(-2.5 * (k % 3))]
         for k in range(12)
     ]
     cells = [["t", "aq1", "q1", "q2"], *rows]
@@ -333,3 +333,12 @@ def test_a_number_too_many_is_not_left_out(tmp_path, row):
     (flaw,) = flaws(tmp_path, f"t,q1,q2\n{row}\n")
     assert flaw[0] == "in.csv:2:1"
     assert "expected 3 as in line 1" in flaw[1]
+
+
+@pytest.mark.parametrize("chunk", [1 << 20, 24])
+def test_decimals_in_quotation_marks_are_the_most_of_all_rows(tmp_path, monkeypatch, chunk):
+    monkeypatch.setattr(table, "_CHUNK", chunk)
+    rows = ['"0","1.25"', '"1.5","2.5"', '"2","3"', '"3","4"', '"4","5.125"', '"5","6"', '"6","7"']
+    found = read(tmp_path, '"t","q1"\n' + "\n".join(rows) + "\n")
+    assert found.decimals.tolist() == [1, 3]
+    assert found.columns[:, 1].tolist() == [1.25, 2.5, 3, 4, 5.125, 6, 7]
