@@ -162,10 +162,10 @@ def _smallest(
 
     Whether the motion keeps them as it is, is left to its rounding, as `trajcli check` does.
     """
-    broken, low, most = judge(rows), 1.0, _SLOWEST
+    broken, low, longest = judge(rows), 1.0, _SLOWEST
     rows = replace(rows, t=rows.t - rows.t[0])  # stamps of far times have fewer digits
     if broken is None:
-        most = 1.0
+        longest = 1.0
         if not fastest:
             return 1.0, None
         while broken is None:
@@ -180,7 +180,7 @@ def _smallest(
         high *= max(broken.factor, 1 + _FINE / 4) if broken.factor is not None else 2.0
         if not isfinite(high) or high > _SLOWEST:
             break
-        high = min(high, most)
+        high = min(high, longest)
         broken = None if high == 1.0 else strictly(stretched(rows, high))
         if broken is None:
             return _bracketed(rows, strictly, (low, high), binding)
@@ -211,8 +211,8 @@ def stretched(rows: RecordedMotion, factor: float) -> RecordedMotion:
         name: None if (found := getattr(rows, name)) is None else found / factor**order
         for order, name in enumerate(ORDERS)
     }
-    known = rows.resolution
-    resolution = replace(known, time=known.time * factor, qd=known.qd / factor, qdd=known.qdd / factor**2)
+    before = rows.resolution
+    resolution = replace(before, time=before.time * factor, qd=before.qd / factor, qdd=before.qdd / factor**2)
     t = rows.t[0] + (rows.t - rows.t[0]) * factor
     return replace(rows, t=t, tau=None, resolution=resolution, **values)
 
@@ -238,8 +238,8 @@ def _rests(motion: EditedMotion, row: int) -> bool:
     velocities = motion.rows.qd
     if velocities is None:
         return True
-    room = 2 * motion.rows.resolution.qd + _AT_REST * (1 + np.abs(velocities).max(axis=0))
-    return bool((np.abs(velocities[row]) <= room).all())
+    slack = 2 * motion.rows.resolution.qd + _AT_REST * (1 + np.abs(velocities).max(axis=0))
+    return bool((np.abs(velocities[row]) <= slack).all())
 
 
 def _verified(

@@ -106,10 +106,10 @@ def _encoded(block: Array, decimals: list[int | None]) -> bytes:
 
 def _plain_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
     """Return the columns of trajcli's own language, in SI, for a file that has none; decimals are kept."""
-    known = {(column.quantity, column.joint): column.decimals for column in motion.columns}
+    given = {(column.quantity, column.joint): column.decimals for column in motion.columns}
 
     def column(name: str, quantity: str, joint: int | None) -> WrittenColumn:
-        decimals = known.get((quantity, joint))
+        decimals = given.get((quantity, joint))
         return WrittenColumn(name, quantity, joint, 1.0, DECIMALS if decimals is None else decimals)
 
     joints = range(motion.rows.q.shape[1])

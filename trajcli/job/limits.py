@@ -119,8 +119,8 @@ def _looser(before: Array, after: Array) -> Iterator[tuple[int, dict[str, float]
 
     A bound before that is not a number is none to compare with.
     """
-    room = _ROUNDING * np.where(np.isfinite(before), np.abs(before), 0.0)
-    ends = (after[:, 0] < before[:, 0] - room[:, 0], after[:, 1] > before[:, 1] + room[:, 1])
+    slack = _ROUNDING * np.where(np.isfinite(before), np.abs(before), 0.0)
+    ends = (after[:, 0] < before[:, 0] - slack[:, 0], after[:, 1] > before[:, 1] + slack[:, 1])
     for joint in np.flatnonzero(ends[0] | ends[1]).tolist():
         end = 1 if ends[1][joint] else 0
         yield joint, {"before": float(before[joint, end]), "after": float(after[joint, end])}

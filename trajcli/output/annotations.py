@@ -206,14 +206,14 @@ def _sarif_rule(name: str, sentence: str | None) -> dict[str, Any]:
 
 def _sarif_result(problem: Problem, index: int) -> dict[str, Any]:
     time = problem.time if problem.time is not None and math.isfinite(problem.time) else None
-    known = {"joint": problem.joint, "time": time, "row": problem.row}
+    given = {"joint": problem.joint, "time": time, "row": problem.row}
     result: dict[str, Any] = {
         "ruleId": str(problem.kind),
         "ruleIndex": index,
         "level": problem.severity,
         "message": {"text": _encodable(problem.message)},
     }
-    properties = {key: value for key, value in known.items() if value is not None}
+    properties = {key: value for key, value in given.items() if value is not None}
     if properties:
         result["properties"] = properties
     place = _place(problem)

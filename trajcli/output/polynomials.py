@@ -137,21 +137,21 @@ def multiples_of_pi(values: ArrayLike) -> list[str | None]:
 
 def _multiple(ratio: float) -> str | None:
     """Return the multiple of pi that a ratio to it is, by convergents of its continued fraction; or None."""
-    size = rest = abs(ratio)
+    size = remainder = abs(ratio)
     if not 0.5 / _DENOMINATOR <= size <= _NUMERATOR:
         return None
     before, last = (0.0, 1.0), (1.0, 0.0)  # numerators and denominators
     for _ in range(_CONVERGENTS):
-        whole = float(math.floor(rest))
+        whole = float(math.floor(remainder))
         before, last = last, (whole * last[0] + before[0], whole * last[1] + before[1])
         numerator, denominator = last
         if denominator > _DENOMINATOR or numerator > _NUMERATOR:
             return None
         if abs(numerator - size * denominator) <= _DIGITS * numerator:
             return _of_pi(int(math.copysign(numerator, ratio)), int(denominator))
-        if rest == whole:
+        if remainder == whole:
             return None
-        rest = 1 / (rest - whole)
+        remainder = 1 / (remainder - whole)
     return None
 
 

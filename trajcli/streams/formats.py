@@ -185,7 +185,7 @@ def format_of(path: str | Path | None, asked: FormatName | None = None) -> Strea
         InputError: When the table does not know its ending, or the file would promise what it does not hold.
     """
     name = "-" if path is None else str(path)
-    ending = next((known for known in ENDINGS if name.lower().endswith(known)), None)
+    ending = next((each for each in ENDINGS if name.lower().endswith(each)), None)
     if ending is None or name == "-" or is_special(name):
         if name == "-" or is_special(name):
             return DEFAULT if asked is None else FORMATS[asked]

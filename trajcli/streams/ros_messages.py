@@ -194,8 +194,8 @@ def _seconds(point: Mapping[str, Any], index: int, file: str) -> tuple[float, in
     value = point.get("time_from_start")
     if isinstance(value, Mapping):
         parts = [value.get(key, value.get(old, 0)) for key, old in (("sec", "secs"), ("nanosec", "nsecs"))]
-        known = {"sec", "secs", "nanosec", "nsecs"}
-        if value and value.keys() <= known and all(map(_is_number, parts)):
+        keys = {"sec", "secs", "nanosec", "nsecs"}
+        if value and value.keys() <= keys and all(map(_is_number, parts)):
             nanoseconds = parts[0] * 10**9 + parts[1]
             if abs(nanoseconds) < 2**63:
                 return nanoseconds / 10**9, _NANOSECONDS

@@ -37,10 +37,10 @@ def chunks(stream: BinaryIO, file: str, before: bytes, size: int) -> Iterator[by
     while text := before + stream.read(size):
         before = b""
         if not text.endswith(b"\n"):
-            rest = stream.readline(LONGEST_LINE)
-            if len(rest) == LONGEST_LINE:
+            tail = stream.readline(LONGEST_LINE)
+            if len(tail) == LONGEST_LINE:
                 raise InputError(f"{file} is no table: it has a line of more than {LONGEST_LINE} bytes")
-            text += rest
+            text += tail
         if b"\r" in text:
             text = text.replace(b"\r\n", b"\n")
         yield text
