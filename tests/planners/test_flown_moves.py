@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -10,10 +11,10 @@ import numpy as np
 import pytest
 
 from trajcli.job.read import job_from_text
-from trajcli.planners.flying_by.flown_moves import FlownZone, zone_events
+from trajcli.planners.flying_by.flown_moves import zone_events
 from trajcli.planning.plan import Plan, plan_job
 
-LIMITS = {
+LIMITS: dict[str, Any] = {
     "velocity": [[-1.0, 3.0], [-3.0, 0.5]],
     "acceleration": [[-2.0, 8.0], [-8.0, 3.0]],
     "jerk": 60.0,
@@ -22,7 +23,7 @@ PLACES = np.array([[0.3, 1.2], [0.9, 1.25], [1.0, 2.0], [1.0, 2.0], [0.2, 0.4], 
 SIZE = 0.02
 ZONES: dict[str, Any] = {
     "position": SIZE,
-    "joints": {"joints": [0.03, 0.06]},
+    "joints": {"joints": [0.03, 0.3]},
     "orientation": {"orientation": 0.05},
 }
 
@@ -40,6 +41,13 @@ def plan(zone: str = "position", **fields: Any) -> Plan:
     return plan_job(
         job_from_text(json.dumps({**job, "zone": ZONES.get(zone, zone), **fields, "moves": moves}))
     )
+
+
+def bare(sizes: tuple[float, float]) -> Plan:
+    """Return the plan of the same places by joints without geometry, in one chain."""
+    moves = [to(place) for place in PLACES[[1, 2, 4]]]
+    job = {"version": 1, "robot": {"joints": 2}, "limits": LIMITS, "start": {"joints": PLACES[0].tolist()}}
+    return plan_job(job_from_text(json.dumps({**job, "zone": {"joints": sizes}, "moves": moves})))
 
 
 def tool(q: np.ndarray) -> np.ndarray:
@@ -90,7 +98,7 @@ def test_what_is_said_of_a_zone_is_what_rows_in_it_show(name: str) -> None:
         shares = {
             "position": distance[[0, -1]] / SIZE,
             "orientation": turn[[0, -1]] / 0.05,
-            "joints": (np.abs(ends - corner) / [0.03, 0.06]).max(axis=1),
+            "joints": (np.abs(ends - corner) / [0.03, 0.3]).max(axis=1),
         }[name]
         assert zone.of == name
         assert zone.used / zone.asked == pytest.approx(shares.min(), rel=1e-6)
@@ -98,34 +106,48 @@ def test_what_is_said_of_a_zone_is_what_rows_in_it_show(name: str) -> None:
         path = tool(np.concatenate(lines))[:, :2]
         most = 50 * int(away_from(path, here[::50, :2]).argmax())
         off = away_from(path, here[max(most - 50, 0) : most + 50, :2]).max()
-        assert zone.deviation == pytest.approx(off, rel=1e-4)  # of rows 0.02 % of a zone apart
+        assert zone.deviation == pytest.approx(off, rel=5e-4)  # of rows apart in time
 
 
-def test_of_a_zone_of_joints_the_one_that_uses_most_of_its_size_is_named() -> None:
-    made = plan("joints")
+@pytest.mark.parametrize("sizes", [(0.03, 0.3), (0.3, 0.02)])
+def test_of_a_zone_of_joints_the_one_that_uses_most_of_its_size_is_named(sizes: tuple[float, float]) -> None:
+    """Of bare joints, too, and these are nearest by their sizes."""
+    made = plan("joints") if sizes[0] < sizes[1] else bare(sizes)
     assert made.flyby is not None
     for zone in made.flyby.zones:
         ends = made.trajectory.curve.evaluate(np.array([zone.entered, zone.left]))
         corner = PLACES[{0: 1, 1: 2, 5: 5}[zone.move]]
-        shares = np.abs(ends - corner) / [0.03, 0.06]
+        shares = np.abs(ends - corner) / sizes
         nearer = shares.max(axis=1).argmin()
         assert zone.joint is not None
         assert shares[nearer, zone.joint] == pytest.approx(shares[nearer].max(), rel=1e-9)
-        assert zone.asked == (0.03, 0.06)[zone.joint]
+        assert zone.asked == sizes[zone.joint]
         assert zone.used == pytest.approx(np.abs(ends - corner)[nearer, zone.joint], rel=1e-9)
         assert zone.ball(made.moves[0].robot) is None
+        if zone.nearest is None:
+            times = np.linspace(zone.entered, zone.left, 20_001)
+            off = np.linalg.norm((made.trajectory.curve.evaluate(times) - corner) / sizes, axis=1)
+            assert zone.passed == pytest.approx(times[off.argmin()], abs=2 * (times[1] - times[0]))
 
 
-def test_the_limit_of_which_a_zone_uses_most_counts_by_its_direction() -> None:
-    made = plan()
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_limit_of_which_a_zone_uses_most_counts_by_its_direction(sign: int) -> None:
+    """In both of a motion and its mirror image."""
+    places = sign * PLACES[[0, 1, 2, 4]]
+    bounds = np.array([LIMITS["velocity"], LIMITS["acceleration"], [[-60.0, 60.0]] * 2])
+    bounds = bounds if sign > 0 else -bounds[:, :, ::-1]
+    limits = dict(zip(("velocity", "acceleration"), bounds[:2].tolist(), strict=True)) | {"jerk": 60.0}
+    job = {"version": 1, "robot": "planar2r", "limits": limits, "start": {"joints": places[0].tolist()}}
+    moves = [to(place) for place in places[1:]]
+    made = plan_job(job_from_text(json.dumps({**job, "zone": SIZE, "moves": moves})))
     assert made.flyby is not None
+    assert len(made.flyby.zones) == 2
     for zone in made.flyby.zones:
         times = np.linspace(zone.entered, zone.left, 20_001)[1:-1]
         used = {}
         for order, name in enumerate(("velocity", "acceleration", "jerk"), 1):
-            rows = made.trajectory.curve.evaluate(times, order)
-            bounds = np.broadcast_to([[-60.0, 60.0]] * 2 if name == "jerk" else LIMITS[name], (2, 2))
-            share = np.maximum(rows / bounds[:, 1], rows / bounds[:, 0]).max(axis=0)
+            rows, (low, high) = made.trajectory.curve.evaluate(times, order), bounds[order - 1].T
+            share = np.maximum(rows / high, rows / low).max(axis=0)
             used |= {f"{name} of j{joint}": value for joint, value in enumerate(share, 1)}
         assert used[zone.binds] == pytest.approx(max(used.values()), rel=1e-4)
 
@@ -138,6 +160,9 @@ def test_pictures_of_a_zone_are_about_its_corner() -> None:
         ball = zone.ball(robot)
         assert ball is not None
         np.testing.assert_allclose(ball, [*tool(corner)[:2], 0.0, zone.used], atol=1e-9)
+        half = replace(zone, used=zone.used / 2).ball(robot)
+        assert half is not None
+        assert half[3] == ball[3] / 2
         path = zone.tool_path(robot)
         ends = tool(made.trajectory.curve.evaluate(np.array([zone.entered, zone.left])))[:, :2]
         np.testing.assert_allclose(path[[0, -1], :2], ends, atol=1e-7)
@@ -184,12 +209,13 @@ def test_what_flying_by_gains_is_counted_from_the_same_job_with_stops() -> None:
         (0.5, (0.5, 1.0, 1.0), ["shrunk", "lowered"]),
     ],
 )
-def test_what_a_zone_concedes_is_said(share: float, shares: tuple[float, ...], kinds: list[str]) -> None:
+def test_what_a_zone_concedes_is_said(
+    share: float, shares: tuple[float, float, float], kinds: list[str]
+) -> None:
     made = plan()
     assert made.flyby is not None
     zone = made.flyby.zones[1]
-    fields = {name: getattr(zone, name) for name in FlownZone.__dataclass_fields__}
-    changed = FlownZone(**{**fields, "asked": 0.02, "used": 0.02 * share, "shares": shares})
+    changed = replace(zone, asked=0.02, used=0.02 * share, shares=shares)
     events = list(zone_events([changed], ["j1", "j2"]))
     assert [event.kind for event in events] == kinds
     assert [event.move for event in events] == [zone.move] * len(kinds)

@@ -129,8 +129,8 @@ def _fly(
         flown_by.append(chain)
     duration = math.fsum(move.duration for move in result)
     stopping = math.fsum(move.duration for move in moves)
-    known = tuple(flown_by) if len(flown_by) == len(groups) else None
-    flyby = FlyBy(duration, stopping, duration - max(saved, 0.0), tuple(zones), known)
+    every = tuple(flown_by) if len(flown_by) == len(groups) else None
+    flyby = FlyBy(duration, stopping, duration - max(saved, 0.0), tuple(zones), every)
     return result, flyby, events
 
 

@@ -113,6 +113,16 @@ def test_beside_the_lock_the_rotation_is_met_and_that_is_said(beside, frame):
     )
 
 
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize(("sequence", "middle"), [("xyz", 2.0), ("xyz", 0.4), ("zyz", -0.5), ("zyz", 0.5)])
+def test_of_both_triples_of_a_rotation_that_which_is_nearer_is_read(sequence, middle, frame):
+    angles = np.array([0.3, middle, -0.2])
+    for aim in (angles + 0.1, angles - [0.4, 0.2, -0.3]):
+        found, locked = nearest_angles(scipys(sequence, frame, angles), sequence, frame, aim)
+        np.testing.assert_allclose(found, angles, atol=1e-12)
+        assert not locked
+
+
 def test_near_the_lock_nothing_is_said():
     matrix = scipys("zyz", "current", [0.3, 1e-3, 0.9])
     angles, locked = nearest_angles(matrix, "zyz", "current", np.array([0.3, 0, 0.9]))

@@ -211,11 +211,15 @@ def test_near_poses_are_left_out_in_a_frame_too(tmp_path, frame):
     assert event.message.startswith("left out 3 of 6 poses")
 
 
-def test_poses_need_a_radius_as_lines_do(tmp_path):
-    (tmp_path / "poses.csv").write_text(HEADER + rows())
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_poses_need_a_radius_as_lines_do(tmp_path, count):
+    (tmp_path / "poses.csv").write_text(HEADER + rows(AROUND[:count], TILTS[:count]))
     move = {"planner": "path", "segments": {"csv": "poses.csv"}}
     content = {"version": 1, "robot": "ur5e", "start": {"xyz": START, "rpy": [np.pi, 0, 0]}, "moves": [move]}
     (tmp_path / "job.yaml").write_text(yaml.safe_dump(content))
+    if count == 1:  # a line, without a corner
+        assert load_job(tmp_path / "job.yaml").job.moves[0].radius is None
+        return
     with pytest.raises(TrajcliError) as caught:
         load_job(tmp_path / "job.yaml")
     (problem,) = caught.value.problems

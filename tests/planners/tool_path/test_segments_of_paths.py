@@ -26,10 +26,12 @@ def line(place: Any, **fields: Any) -> dict[str, Any]:
     return {"line": {"xyz": np.asarray(place).tolist()}, **fields}
 
 
-def path_of(*segments: dict[str, Any], before: np.ndarray = BEFORE, **fields: Any) -> PlannedPath:
+def path_of(
+    *segments: dict[str, Any], before: np.ndarray = BEFORE, robot: str = "ur5e", **fields: Any
+) -> PlannedPath:
     """Return the path of a move from a pose."""
     move = {"planner": "path", "segments": list(segments), "corner": "stop", **fields}
-    loaded = job_from_text(job_text("ur5e", HERE, move))
+    loaded = job_from_text(job_text(robot, HERE, move))
     return loaded.job.moves[0].path_from(before, loaded.robot)  # type: ignore[attr-defined, no-any-return]
 
 
@@ -94,6 +96,43 @@ def test_what_an_event_says_of_a_shrunk_corner_is_where_the_path_passes() -> Non
 def test_a_tool_that_keeps_its_attitude_to_the_path_would_jump_at_the_first_corner() -> None:
     with pytest.raises(TrajcliError, match=r"at the corner at s = 0\.2 m"):
         path_of(*(line(point) for point in POINTS[1:]), orientation="tangent")
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "planar3r"])
+def test_an_orientation_that_follows_from_the_path_is_fixed_whole(robot: str) -> None:
+    planned = path_of(line([0.3, 0.1, 0.3]), robot=robot, orientation="tangent")
+    assert planned.path.orientation == "all"
+
+
+def test_a_single_segment_overlaps_nothing_and_more_are_no_path_that_could_be_flown_by() -> None:
+    fields = {"corner": "overlap", "overlap": 0.1, "law": {"speed": 0.1, "acceleration": 1.0}}
+    assert path_of(line(POINTS[1]), line(POINTS[1]), **fields).overlap is None
+    both = path_of(line(POINTS[1]), line(POINTS[2]), **fields)
+    assert both.overlap is not None
+    assert both.overlap.overlaps
+    move = {"planner": "path", "segments": [line(POINTS[1]), line(POINTS[2])]}
+    for given, reason in (({**move, **fields}, "overlap in time"), ({**move, "corner": "stop"}, None)):
+        (planner,) = job_from_text(job_text("ur5e", HERE, given)).job.moves
+        assert (planner.why_not_flown_by is None) == (reason is None)
+        assert reason is None or reason in str(planner.why_not_flown_by)
+
+
+def test_joints_are_pinned_in_the_last_segment_alone() -> None:
+    pinned = {"line": {"xyz": POINTS[1].tolist(), "joints": {"wrist_3_joint": 0.1}}}
+    assert path_of(line(POINTS[2]), pinned).path.length > 0
+    with pytest.raises(TrajcliError, match="a joint is pinned in segment 1") as caught:
+        path_of(line(POINTS[2]), pinned, line(POINTS[3]))
+    assert caught.value.problems[0].field == ("segments", 1)
+
+
+def test_the_configuration_of_the_last_target_is_that_of_the_path() -> None:
+    named = {"configuration": {"elbow": "up"}}
+    quarter = {"center": [0.5, 0.3, 0.3], "to": {"xyz": [0.5, 0.2, 0.3], **named}}
+    for last in ({"line": {"xyz": POINTS[2].tolist(), **named}}, {"arc": quarter}):
+        configuration = path_of(line(POINTS[1]), last).configuration
+        assert configuration is not None
+        assert configuration.branch_names == {"elbow": "up"}
+        assert path_of(last if "line" in last else line(POINTS[1]), line(POINTS[3])).configuration is None
 
 
 def test_a_yaw_changes_by_what_each_of_its_segments_says() -> None:

@@ -149,7 +149,7 @@ def angles_to_count_from(
     aim = np.asarray(target, dtype=np.float64)
     far = np.abs(aim) > np.pi + _HALF
     weight = np.where(far, _LITTLE, 1.0)
-    angles, locked = nearest_angles(rotation, sequence, frame, np.where(far, 0.0, aim), weight)
+    angles, locked = nearest_angles(rotation, sequence, frame, np.where(far, 0.0, aim))
     if locked:
         return angles
     # half a turn at the start is on the side of the target, whatever rounding says

@@ -53,8 +53,8 @@ def _mirrored(bounds: BoundsAbout) -> BoundsAbout:
 
 def _backwards(part: ChainPart) -> ChainPart:
     if isinstance(part, PathPart):
-        low, high, least, most, *jerks = part.bounds.tolist()
-        return PathPart(np.array([low, high, -most, -least, *jerks]), part.length, part.typical)
+        low, high, falling, rising, *jerks = part.bounds.tolist()
+        return PathPart(np.array([low, high, -rising, -falling, *jerks]), part.length, part.typical)
     bounds = part.bounds.copy()
     bounds[:, :2] = -part.bounds[:, 1::-1]
     turned = [rates * np.array([[-1.0], [1.0]]) for rates in (part.after, part.before)]

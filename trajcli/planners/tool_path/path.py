@@ -170,7 +170,7 @@ class PathMove(WovenMove):
         how, start = self.orientation, before[:3, :3]
         turning = orientation_along(how, start, targets, chain, chain.progress, self.origin)
         poses = PoseCurve(chain, turning)
-        if poses.jumps.size and not overlap:
+        if poses.jumps.size:
             raise _jump(float(poses.jumps[0]))
         last = targets[-1]
         fixed = "all" if self.orientation == "tangent" else last.orientation
@@ -179,13 +179,7 @@ class PathMove(WovenMove):
         path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress, speeds)
         to = segments[-1].line or (segments[-1].arc and segments[-1].arc.to)
         merged = merged_events(len(segments), kept)
-        events = (
-            *left_out,
-            *merged,
-            *turned_back,
-            *center_events(curves),
-            *(() if overlap else _radius_events(chain)),
-        )
+        events = (*left_out, *merged, *turned_back, *center_events(curves), *_radius_events(chain))
         ends = [*(corner.s for corner in chain.corners), path.length]
         planned = PlannedPath(
             path,

@@ -137,12 +137,12 @@ class SegmentsField(ListOrRecorded):
 
 def _from_file(value: Mapping[str, Any], context: ReadingContext) -> RecordedPoses:
     """Return the poses of a file, in world, m."""
-    known = ("csv", "in", "merge")
-    unknown = [str(key) for key in value if key not in known]
+    keys = ("csv", "in", "merge")
+    unknown = [str(key) for key in value if key not in keys]
     if unknown:
         from trajcli.suggest import did_you_mean, valid_names
 
-        hint = did_you_mean(unknown[0], known) or valid_names(known)
+        hint = did_you_mean(unknown[0], keys) or valid_names(keys)
         raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], AT_KEY, hint=hint)
     path = value.get("csv")
     if not isinstance(path, str):

@@ -1,0 +1,140 @@
+"""Corners of a job that are flown by: their chains, remarks and refusals, and bounds of the whole job."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from trajcli.errors import InputError
+from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.kinematics.zone import Zone
+from trajcli.planning import flown_job
+from trajcli.planning.flown_job import FlownCorner, FlyBy, chains, flown_corners
+
+
+def loaded(*moves: dict[str, Any], robot: Any = "planar2r", **fields: Any) -> LoadedJob:
+    job = {"version": 1, "robot": robot, "start": {"joints": 0.3}, "zone": 0.02, **fields}
+    return job_from_text(json.dumps({**job, "moves": list(moves)}, indent=1))
+
+
+def to(*joints: float, **fields: Any) -> dict[str, Any]:
+    return {"planner": "jerk_limited", "to": {"joints": list(joints)}, **fields}
+
+
+SLOW = {"planner": "line", "to": {"xyz": [0.3, 0.3, 0]}, "law": {"shape": "quintic", "duration": 3}}
+HOLD = {"planner": "hold", "duration": 1}
+
+
+def test_corners_of_moves_that_follow_each_other_make_a_chain() -> None:
+    corners = [FlownCorner(k, Zone(position=0.1), explicit=False) for k in (0, 1, 3, 5, 6, 7)]
+    assert [[corner.move for corner in chain] for chain in chains(corners)] == [[0, 1], [3], [5, 6, 7]]
+    assert list(chains([])) == []
+
+
+def test_the_zone_of_a_move_counts_before_that_of_the_job() -> None:
+    found = flown_corners(loaded(to(1, 1, zone=0.05), to(0, 1), to(1, 0, zone="stop"), to(0, 0)))
+    assert [(corner.move, corner.zone.position, corner.explicit) for corner in found.flown] == [
+        (0, 0.05, True),
+        (1, 0.02, False),
+    ]
+    assert [(remark.move, remark.message) for remark in found.remarks] == [
+        (3, "stops at its end: it is the last move")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("moves", "reason"),
+    [
+        ([to(1, 1), HOLD], "of move 1 (hold) behind it, hold stops at its ends"),
+        ([to(1, 1), {"tool": {"xyz": [0.1, 0, 0]}}, to(0, 0)], "the arm stands for `tool` behind it"),
+        ([SLOW, to(0, 0)], "its law has a `duration`"),
+        ([to(1, 1), SLOW], "of move 1 (line) behind it, its law has a `duration`"),
+    ],
+)
+def test_a_default_zone_that_cannot_be_is_a_remark_and_one_of_the_move_is_refused(
+    moves: list[dict[str, Any]], reason: str
+) -> None:
+    found = flown_corners(loaded(*moves))
+    assert [corner.move for corner in found.flown if corner.move == 0] == []
+    first = found.remarks[0]
+    assert (first.kind, first.move, first.message) == ("zone_stops", 0, f"stops at its end: {reason}")
+    given = loaded({**moves[0], "zone": 0.03}, *moves[1:])
+    with pytest.raises(InputError) as caught:
+        flown_corners(given)
+    (problem,) = caught.value.problems
+    assert problem.message == f"move 0 ({moves[0]['planner']}): its corner cannot be flown by: {reason}"
+    assert problem.place == given.document.place(("moves", 0, "zone"))
+
+
+def test_a_move_that_stands_has_no_corner_to_remark_on() -> None:
+    found = flown_corners(loaded(HOLD, to(1, 1), to(0, 0)))
+    assert [corner.move for corner in found.flown] == [1]
+    assert [remark.move for remark in found.remarks] == [2]
+    with pytest.raises(InputError, match="move 0"):
+        flown_corners(loaded({**HOLD, "zone": 0.03}, to(1, 1)))
+
+
+def test_a_zone_in_rounds_is_refused_only_where_no_round_can_be_flown_by() -> None:
+    rounds = [{"repeat": 3, "moves": [to(1, 1), to(0, 0, zone=0.03)]}]
+    found = flown_corners(loaded(*rounds))
+    assert [corner.move for corner in found.flown if corner.explicit] == [1, 3]
+    assert [remark.move for remark in found.remarks] == [5]
+    with pytest.raises(InputError, match="move 1"):
+        flown_corners(loaded({**rounds[0], "repeat": 1}))
+
+
+def test_bare_joints_have_no_zone_of_a_tool() -> None:
+    bare: dict[str, Any] = {"robot": {"joints": 2}}
+    found = flown_corners(loaded(to(1, 1), to(0, 0), **bare))
+    assert not found.flown
+    assert "has no geometry" in found.remarks[0].message
+    assert len(flown_corners(loaded(to(1, 1), to(0, 0), zone={"joints": 0.1}, **bare)).flown) == 1
+
+
+def flyby(monkeypatch: pytest.MonkeyPatch, close: list[float | None]) -> FlyBy:
+    """Return what flying by gained of chains of 3 s and 5 s, of which second-order bounds are 2.5 s and 4 s."""
+    some: Any = tuple(
+        SimpleNamespace(duration=duration, second=second, close=bound)
+        for duration, second, bound in zip((3.0, 5.0), (2.5, 4.0), close, strict=True)
+    )
+    monkeypatch.setattr(flown_job, "second_order_bound", lambda chain: chain.second)
+    monkeypatch.setattr(flown_job, "close_bound", lambda chain: chain.close)
+    return FlyBy(10.0, 12.0, 10.0, (), some)
+
+
+@pytest.mark.parametrize(
+    ("close", "bound", "method"),
+    [
+        ([None, None], 8.5, "second_order"),
+        ([2.9, None], 8.9, "second_order"),
+        ([2.9, 4.75], 9.65, "proven"),
+        ([2.4, 4.75], 9.25, "proven"),
+        ([2.9, 3.0], 8.9, "proven"),
+    ],
+)
+def test_the_bound_of_a_job_is_the_highest_that_is_known_of_each_chain(
+    close: list[float | None], bound: float, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What each chain takes longer than its bound is taken from the duration of the job, stops and all."""
+    whole = flyby(monkeypatch, close)
+    assert whole.second_order == 8.5
+    assert whole.best_bound == (pytest.approx(bound), method)
+
+
+def test_where_a_chain_stops_nothing_bounds_the_job() -> None:
+    stopping = FlyBy(10.0, 12.0, 10.0, (), None)
+    assert stopping.second_order is None
+    assert stopping.best_bound is None
+
+
+@pytest.mark.parametrize(
+    ("duration", "periods"), [(1.2345, 124), (1.24, 124), (1.24 + 1e-13, 124), (1.2401, 125), (0.001, 1)]
+)
+def test_an_aligned_chain_lasts_the_next_whole_number_of_periods(
+    duration: float, periods: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flown_job, "stretched_chain", lambda chain, factor: chain.duration * factor)
+    assert flown_job._aligned(SimpleNamespace(duration=duration), 100.0) == pytest.approx(periods / 100.0)  # type: ignore[arg-type]
