@@ -123,3 +123,22 @@ def test_braking_in_a_later_move_and_slowed_for_the_tool():
     plan = plan_job(job_from_text(text))
     assert plan.verdict.passed
     assert [event.move for event in plan.events if event.kind == "braked"] == [0, 0, 1]
+
+
+@pytest.mark.parametrize("synchronize", ["time", "phase"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_each_joint_says_until_when_it_brakes(sign, synchronize):
+    """By then its velocity is within its limit, and shortly before it is not, whatever the other joint does."""
+    robot = arm([1.0, 1.0], [2.0, 2.0], [[-9.0, 30.0], [-9.0, 30.0]])
+    speeds = np.array([1.4, 1.4 if synchronize == "phase" else 2.0]) * sign
+    target = state(np.array([5.0, 5.0]) * sign)
+    planned = move_to(target, brake=True, synchronize=synchronize).plan(state([0.0, 0.0], speeds), robot)
+    kinds = [event.kind for event in planned.events]
+    assert kinds.count("braked") == 2
+    assert set(kinds) == {"braked", "jerk_limit_both_ways"}  # what else there is to say is not lost
+    for joint, event in enumerate(event for event in planned.events if event.kind == "braked"):
+        time, limit = event.amounts["time"].value, event.amounts["limit"].value
+        assert limit == sign
+        assert 0.0 < time < 2.0
+        at, before = (abs(float(planned.curve.evaluate(t, 1)[joint])) for t in (time, 0.95 * time))
+        assert at <= 1.0 + 1e-9 < before

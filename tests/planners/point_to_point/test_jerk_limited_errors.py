@@ -129,3 +129,84 @@ def test_common_duration_leaps_over_gaps():
     for profile, task in zip(chosen, (passing, slow), strict=True):
         ends = [float(profile.curve().piece_ends(order)[1][-1, 0]) for order in range(3)]
         np.testing.assert_allclose(ends, task.final, atol=1e-14)
+
+
+LINE = np.array([1.0, 2.0])
+
+
+def of_one_law(sign, jerk=50.0):
+    """Return a robot whose first joint is slow in one direction, and whose second has little jerk in one."""
+    slow = [[-1.0, 7.0], [-7.0, 1.0]][sign > 0]
+    return arm([slow, [-9.0, 9.0]], [[-9.0, 9.0]] * 2, [[-50.0, 50.0], [-5.0, jerk]])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("at_end", [False, True])
+def test_phase_refuses_what_each_joint_alone_could_keep_and_one_law_cannot(sign, at_end):
+    """At 0.9 with 1.5, of the jerk 5 / 2 that the second joint leaves: 0.9 + 1.5^2 / 5 is more than the first may."""
+    robot, rest = of_one_law(sign), np.zeros(2)
+    rates = sign * 0.9 * LINE, sign * (-1.5 if at_end else 1.5) * LINE
+    start, end = state(rest), state(6.0 * sign * LINE)
+    if at_end:
+        end = state(end.position, *rates)
+    else:
+        start = state(rest, *rates)
+    (problem,) = refusal(end, start=start, robot=robot, synchronize="phase")
+    assert (problem.joint, problem.hint) == ("j1", "say `synchronize: time`")
+    assert problem.value == pytest.approx(sign * 1.35, rel=1e-12)
+    assert problem.limit == sign
+    assert ("before its end" if at_end else "from its start") in problem.message
+    assert move_to(end).plan(start, robot).curve.duration > 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_phase_takes_an_acceleration_that_leads_away_from_a_limit(sign):
+    robot = of_one_law(sign)
+    start = state([0.0, 0.0], sign * 0.9 * LINE, -sign * 1.5 * LINE)
+    end = state(6.0 * sign * LINE, sign * 0.5 * LINE, sign * 0.4 * LINE)
+    planned = move_to(end, synchronize="phase").plan(start, robot)
+    for order, (first, last) in enumerate(
+        ((start.velocity, end.velocity), (start.acceleration, end.acceleration)), 1
+    ):
+        np.testing.assert_allclose(planned.curve.piece_ends(order)[0][0], first, atol=1e-9)
+        np.testing.assert_allclose(planned.curve.piece_ends(order)[1][-1], last, atol=1e-9)
+
+
+def test_phase_refuses_a_velocity_that_is_a_little_beside_the_line():
+    (problem,) = refusal(state([1.0, 0.0], [0.5, 0.02]), synchronize="phase")
+    assert problem.joint == "j2"
+
+
+@pytest.mark.parametrize("jerk", [[-5.0, 50.0], [-50.0, 5.0]])
+def test_the_smaller_jerk_says_from_where_an_end_can_be_reached(jerk):
+    robot = arm([1.0, 2.0], [2.0, 3.0], [jerk, [-6.0, 6.0]])
+    (problem,) = refusal(state([1.0, 2.0], [0.9, 0.0], [-1.5, 0.0]), robot=robot)
+    assert problem.value == pytest.approx(0.9 + 1.5**2 / 10.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("joints", [True, False])
+def test_a_joint_that_accelerates_at_its_end_cannot_wait(joints):
+    end = state([0.1, 20.0], [0.0 if joints else 0.1, 1.9], [0.3, 0.0])
+    (problem,) = refusal(end, joints=joints, synchronize="none")
+    assert problem.joint == "j1"
+    assert problem.amounts["arrival"].value < problem.amounts["duration"].value
+
+
+@pytest.mark.parametrize("synchronize", ["time", "phase"])
+def test_a_minimum_that_one_joint_passes_anyway_is_no_event(synchronize):
+    """The first joint could arrive before; the second cannot, with or without a minimum."""
+    end, start = state([0.2, 3.0]), state([0.0, 0.0])
+    alone = move_to(end, synchronize=synchronize).plan(start, ROBOT)
+    least = 0.9 * alone.curve.duration
+    planned = move_to(end, synchronize=synchronize, minimum_duration=least).plan(start, ROBOT)
+    assert planned.curve.duration == pytest.approx(alone.curve.duration)
+    assert not planned.events
+
+
+def test_what_ends_with_an_acceleration_ends_in_motion():
+    assert move_to(state([1.0, 2.0], 0.0, [0.0, 0.1])).why_not_flown_by == "it ends in motion"
+    assert move_to(state([1.0, 2.0])).why_not_flown_by is None
+
+
+def test_joints_that_arrive_one_by_one_have_no_line_within_limits_of_the_tool():
+    assert move_to(state([1.0, 2.0]), synchronize="none").within_tool_limits(state([0.0, 0.0]), ROBOT) is None

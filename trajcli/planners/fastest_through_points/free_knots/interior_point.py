@@ -75,7 +75,7 @@ def _least_jerk(problem: KnotProblem, times: Array, ends: Array) -> KnotMotion:
     still = KnotMotion(lengths, ends, np.zeros((*problem.steps.shape, count - 1)))
     walk = Walk(problem, still)
     slopes = Slopes(problem, still, walk)
-    weights, pull = np.zeros((2, *walk.room.shape))
+    weights, pull = np.zeros((2, *walk.spare.shape))
     weights[6:8] = 1 / lengths[:, None]
     pull[6] = -np.diff(walk.accelerations, axis=2) / problem.jerk[:, None] / lengths[:, None]
     pull[7] = -pull[6]
@@ -111,19 +111,19 @@ class _Slacks:
     """Slacks, or multipliers, or what they change by.
 
     Attributes:
-        room: Of `Walk.room`.
-        time: Of `Walk.room_of_time`.
+        spare: Of `Walk.spare`.
+        time: Of `Walk.spare_time`.
     """
 
-    room: Array
+    spare: Array
     time: Array
 
     def along(self, change: _Slacks, part: float) -> _Slacks:
-        return _Slacks(self.room + part * change.room, self.time + part * change.time)
+        return _Slacks(self.spare + part * change.spare, self.time + part * change.time)
 
     def share(self, changes: _Slacks) -> float:
         """Return how far, at most 1, these positive numbers may go along their changes."""
-        worst = max(float((-changes.room / self.room).max()), float((-changes.time / self.time).max()))
+        worst = max(float((-changes.spare / self.spare).max()), float((-changes.time / self.time).max()))
         return 1.0 if worst <= _PART else _PART / worst
 
 
@@ -138,10 +138,10 @@ class _Iterate:
     def __init__(self, problem: KnotProblem, motion: KnotMotion) -> None:
         self._problem, self.motion, self.done = problem, motion, False
         walk = self._walk = Walk(problem, motion)
-        self._slack = _Slacks(np.maximum(walk.room, _SLACK), np.maximum(walk.room_of_time, _SLACK))
-        self._count = walk.room.size + walk.room_of_time.size
+        self._slack = _Slacks(np.maximum(walk.spare, _SLACK), np.maximum(walk.spare_time, _SLACK))
+        self._count = walk.spare.size + walk.spare_time.size
         self._product = _BEGIN * motion.duration / self._count
-        self._force = _Slacks(self._product / self._slack.room, self._product / self._slack.time)
+        self._force = _Slacks(self._product / self._slack.spare, self._product / self._slack.time)
         self._pull = np.zeros_like(walk.landing)
         self._curved, self._penalty, self._foreseen = _CURVED, 1.0, np.inf
 
@@ -149,30 +149,30 @@ class _Iterate:
         """Take a step; return whether there was one."""
         walk, slack, force = self._walk, self._slack, self._force
         slopes = Slopes(self._problem, self.motion, walk)
-        dual = slopes.adjoint(-force.room, self._pull)
+        dual = slopes.adjoint(-force.spare, self._pull)
         dual_lengths = 1.0 - force.time[:, :-1] - force.time[:, -1:]
-        miss = _Slacks(walk.room - slack.room, walk.room_of_time - slack.time)
+        miss = _Slacks(walk.spare - slack.spare, walk.spare_time - slack.time)
         self._lower_product(dual, dual_lengths, miss)
         system = self._system(slopes)
         if system is None:
             return False
         push, push_time = (
             (self._product - f * m) / s - f
-            for f, m, s in ((force.room, miss.room, slack.room), (force.time, miss.time, slack.time))
+            for f, m, s in ((force.spare, miss.spare, slack.spare), (force.time, miss.time, slack.time))
         )
         columns = slopes.adjoint(push, np.zeros_like(walk.landing)) - dual
         lengths = push_time[:, :-1] + push_time[:, -1:] - dual_lengths
         change, d_pull = system.solve(-walk.landing, columns, lengths)
         together = change.lengths.sum(axis=1)[:, None]
         d_time = np.concatenate([change.lengths, together], axis=1) + miss.time
-        d_slack = _Slacks(slopes.apply(change) + miss.room, d_time)
-        if not np.isfinite(d_slack.room).all():
+        d_slack = _Slacks(slopes.apply(change) + miss.spare, d_time)
+        if not np.isfinite(d_slack.spare).all():
             return False
         self._penalty = max(self._penalty, _PENALTY * float(np.abs(self._pull + d_pull).max()))
         part = self._search(change, d_slack, system.inverse[..., LANDINGS:, :LANDINGS])
         self._pull = self._pull + part * d_pull
         d_force = _Slacks(
-            (self._product - force.room * d_slack.room) / slack.room - force.room,
+            (self._product - force.spare * d_slack.spare) / slack.spare - force.spare,
             (self._product - force.time * d_slack.time) / slack.time - force.time,
         )
         self._force = force.along(d_force, force.share(d_force))
@@ -181,7 +181,7 @@ class _Iterate:
     def _system(self, slopes: Slopes) -> KnotSystem | None:
         """Return the system of a step that goes down; None where curvature is of no help."""
         slack, force = self._slack, self._force
-        matrix = slopes.stiffness(force.room / slack.room) + slopes.bending(-force.room, self._pull)
+        matrix = slopes.stiffness(force.spare / slack.spare) + slopes.bending(-force.spare, self._pull)
         landing = slopes.rows[:, :, -LANDINGS:]
         try:
             system = KnotSystem(self._problem, matrix, landing, force.time / slack.time)
@@ -196,9 +196,9 @@ class _Iterate:
     def _search(self, change: Change, d_slack: _Slacks, inverse: Array) -> float:
         """Go along a change as far as the merit falls; return which part of it that is."""
         slack, walk, product = self._slack, self._walk, self._product
-        stiff = max(1.0, _STIFF * float(np.abs(self._force.room).max()))
+        stiff = max(1.0, _STIFF * float(np.abs(self._force.spare).max()))
         before, missed = self._merit(self.motion, walk, slack, stiff)
-        each = (d_slack.room / slack.room).sum() + (d_slack.time / slack.time).sum()
+        each = (d_slack.spare / slack.spare).sum() + (d_slack.time / slack.time).sum()
         slope = float(change.lengths.sum()) - product * float(each) - missed
         self._foreseen = -slope
         part, halvings = slack.share(d_slack), 0
@@ -210,28 +210,28 @@ class _Iterate:
                 motion = KnotMotion(motion.lengths, motion.ends, motion.bends - back)
                 after = Walk(self._problem, motion)
             new = slack.along(d_slack, part)
-            kept = np.where(after.room > _NEAR * slack.room, after.room, new.room)
+            kept = np.where(after.spare > _NEAR * slack.spare, after.spare, new.spare)
             merit, _ = self._merit(motion, after, _Slacks(kept, new.time), stiff)
             wanted = before + _ENOUGH * part * min(slope, 0.0) + _ROUNDING * abs(before)
             if merit <= wanted or halvings == _HALVINGS:
                 break
             part, halvings = 0.5 * part, halvings + 1
         self._curved = self._curved * _TURNED if halvings > 1 else max(self._curved / _LOWERED, _FLAT)
-        self.motion, self._walk, self._slack = motion, after, _Slacks(np.maximum(after.room, kept), new.time)
+        self.motion, self._walk, self._slack = motion, after, _Slacks(np.maximum(after.spare, kept), new.time)
         return part
 
     def _merit(self, motion: KnotMotion, walk: Walk, slack: _Slacks, stiff: float) -> tuple[float, float]:
         """Return what a step shall lower, and the part of it that limits and points missed have."""
-        missed = np.abs(walk.room - slack.room).sum() + np.abs(walk.room_of_time - slack.time).sum()
+        missed = np.abs(walk.spare - slack.spare).sum() + np.abs(walk.spare_time - slack.time).sum()
         counted = stiff * float(missed) + self._penalty * float(np.abs(walk.landing).sum())
-        barrier = float(np.log(slack.room).sum() + np.log(slack.time).sum())
+        barrier = float(np.log(slack.spare).sum() + np.log(slack.time).sum())
         return motion.duration - self._product * barrier + counted, counted
 
     def _lower_product(self, dual: Array, dual_lengths: Array, miss: _Slacks) -> None:
         """Lower the products of slacks and multipliers where little can be gained with them as they are."""
         slack, force, duration = self._slack, self._force, self.motion.duration
-        gap = float((slack.room * force.room).sum() + (slack.time * force.time).sum())
-        missed = max(float(np.abs(miss.room).max()), float(np.abs(self._walk.landing).max()))
+        gap = float((slack.spare * force.spare).sum() + (slack.time * force.time).sum())
+        missed = max(float(np.abs(miss.spare).max()), float(np.abs(self._walk.landing).max()))
         total = self._product * self._count
         self.done = gap < 3 * _GOAL * duration and missed < _MET
         near = self._foreseen < _SMALL * total

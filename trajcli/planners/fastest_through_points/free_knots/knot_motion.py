@@ -36,7 +36,7 @@ class KnotProblem:
         least: Shortest duration of each segment, shape (K,).
         shortest: Shortest duration of each interval, shape (K, M).
         free: Which velocities and accelerations at the points are unknown, shape (K + 1, n, 2).
-        room: Distance from each point down and up to the position limits, shape (K + 1, n, 2); None where no
+        spare: Distance from each point down and up to the position limits, shape (K + 1, n, 2); None where no
             joint has any.
     """
 
@@ -47,7 +47,7 @@ class KnotProblem:
     least: Array
     shortest: Array
     free: NDArray[np.bool_]
-    room: Array | None
+    spare: Array | None
 
     @property
     def bend(self) -> Array:
@@ -111,9 +111,9 @@ class Walk:
         speeds: Velocity at all knots, shape (K, n, M + 1).
         positions: Position after each interval from the point before, shape (K, n, M).
         landing: By how much velocity and position at the end of each segment miss, shape (K, n, 2).
-        room: Distances from limits, shape (F, K, n, M): velocity, its middle Bezier points, acceleration,
+        spare: Distances from limits, shape (F, K, n, M): velocity, its middle Bezier points, acceleration,
             jerk, each below and above; then positions, where they have limits.
-        room_of_time: Distances of intervals, then of segments, from their shortest, shape (K, M + 1).
+        spare_time: Distances of intervals, then of segments, from their shortest, shape (K, M + 1).
     """
 
     def __init__(self, problem: KnotProblem, motion: KnotMotion) -> None:
@@ -129,9 +129,9 @@ class Walk:
         bend, bent = problem.bend[:, None], np.diff(a, axis=2) / problem.jerk[:, None]
         rows = [v[..., 1:] - low[0], high[0] - v[..., 1:], middle - low[0], high[0] - middle]
         rows += [(a[..., 1:] - low[1]) / bend, (high[1] - a[..., 1:]) / bend, h + bent, h - bent]
-        if problem.room is not None:
-            down, up = np.moveaxis(problem.room[:-1, ..., None], 2, 0)
+        if problem.spare is not None:
+            down, up = np.moveaxis(problem.spare[:-1, ..., None], 2, 0)
             rows += [self.positions + down, up - self.positions]
-        self.room = np.stack(rows)
+        self.spare = np.stack(rows)
         each = [motion.lengths - problem.shortest, (motion.lengths.sum(axis=1) - problem.least)[:, None]]
-        self.room_of_time = np.concatenate(each, axis=1)
+        self.spare_time = np.concatenate(each, axis=1)

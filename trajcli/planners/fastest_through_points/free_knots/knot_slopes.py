@@ -22,7 +22,7 @@ from trajcli.planners.fastest_through_points.free_knots.knot_motion import (
 )
 
 _TINY = 1e-8  # added to the diagonal of what is eliminated
-_POSITIONS = 8  # where the distances of positions begin, in `Walk.room`
+_POSITIONS = 8  # where the distances of positions begin, in `Walk.spare`
 
 
 class Slopes:
@@ -36,7 +36,7 @@ class Slopes:
     def __init__(self, problem: KnotProblem, motion: KnotMotion, walk: Walk) -> None:
         self._walk, self._h, self._bend = walk, motion.lengths, problem.bend[:, None]
         self._steep = (problem.bend / problem.jerk)[:, None]
-        self._free, self._walled = problem.free, problem.room is not None
+        self._free, self._walled = problem.free, problem.spare is not None
         bends, lengths, speeds = self._parts()
         joints, count = problem.steps.shape[1], motion.lengths.shape[1]
         first, free = bends[:, None] * self._bend[:, None], problem.free.astype(np.float64)
@@ -77,7 +77,7 @@ class Slopes:
         return np.concatenate(bends, axis=1), np.concatenate(lengths, axis=2), np.concatenate(speeds, axis=1)
 
     def apply(self, change: Change) -> Array:
-        """Return the changes of `Walk.room`."""
+        """Return the changes of `Walk.spare`."""
         along = (self.rows @ change.local()[..., None])[..., 0]
         count = self._h.shape[1]
         ends = change.ends[..., 1:]
@@ -91,7 +91,7 @@ class Slopes:
         return np.stack(rows)
 
     def adjoint(self, forces: Array, landing: Array) -> Array:
-        """Return the columns (K, n, C) of forces on `Walk.room`, and on `Walk.landing`."""
+        """Return the columns (K, n, C) of forces on `Walk.spare`, and on `Walk.landing`."""
         count = self._h.shape[1]
         pairs = forces[::2] - forces[1::2]
         kinds = [pairs[0], pairs[1], *pairs[_POSITIONS // 2 :], landing]
@@ -99,7 +99,7 @@ class Slopes:
         bends = np.zeros(self._walk.accelerations.shape)
         bends[..., 1:] = pairs[2] + pairs[3] * self._steep
         bends[..., :-1] -= pairs[3] * self._steep
-        columns[..., self._bend_columns(count)] += bends * self._known
+        columns[..., self._bend_columns(count)] += bends * self._unknown
         columns[..., count + 3 :] += forces[6] + forces[7]
         return columns
 
@@ -109,27 +109,27 @@ class Slopes:
         return np.concatenate([[count], np.arange(count - 1), [count + 2]])
 
     @property
-    def _known(self) -> Array:
+    def _unknown(self) -> Array:
         """One for each acceleration that is unknown, else zero, shape (K, n, M + 1)."""
-        known = np.ones(self._walk.accelerations.shape)
-        known[..., 0], known[..., -1] = self._free[:-1, :, 1], self._free[1:, :, 1]
-        return known
+        unknown = np.ones(self._walk.accelerations.shape)
+        unknown[..., 0], unknown[..., -1] = self._free[:-1, :, 1], self._free[1:, :, 1]
+        return unknown
 
     def stiffness(self, weights: Array) -> Array:
-        """Return the matrices (K, n, C, C) of the squares of `Walk.room`'s changes with such weights."""
+        """Return the matrices (K, n, C, C) of the squares of `Walk.spare`'s changes with such weights."""
         rows = self.rows[:, :, :-LANDINGS]
         pairs = weights[::2] + weights[1::2]
         kinds = np.concatenate([pairs[0], pairs[1], *pairs[_POSITIONS // 2 :]], axis=2)
         matrix: Array = rows.swapaxes(2, 3) @ (rows * kinds[..., None])
-        count, known = self._h.shape[1], self._known
+        count, unknown = self._h.shape[1], self._unknown
         at, lengths = self._bend_columns(count), np.arange(count + 3, 2 * count + 3)
         square, both = pairs[3] * self._steep**2, (weights[6] - weights[7]) * self._steep
-        diagonal = np.zeros(known.shape)
+        diagonal = np.zeros(unknown.shape)
         diagonal[..., 1:] += pairs[2] + square
         diagonal[..., :-1] += square
-        matrix[:, :, at, at] += diagonal * known
-        beside = [(at[1:], at[:-1], -square * known[..., 1:] * known[..., :-1])]
-        beside += [(at[1:], lengths, both * known[..., 1:]), (at[:-1], lengths, -both * known[..., :-1])]
+        matrix[:, :, at, at] += diagonal * unknown
+        beside = [(at[1:], at[:-1], -square * unknown[..., 1:] * unknown[..., :-1])]
+        beside += [(at[1:], lengths, both * unknown[..., 1:]), (at[:-1], lengths, -both * unknown[..., :-1])]
         for row, column, value in beside:
             matrix[:, :, row, column] += value
             matrix[:, :, column, row] += value
@@ -137,7 +137,7 @@ class Slopes:
         return matrix
 
     def bending(self, forces: Array, landing: Array) -> Array:
-        """Return second derivatives (K, n, C, C) of the sum of `Walk.room` and `Walk.landing` times these."""
+        """Return second derivatives (K, n, C, C) of sums of `Walk.spare` and `Walk.landing` times these."""
         h, walk, a = self._h[:, None], self._walk, self._walk.accelerations
         count = self._h.shape[1]
         pairs = forces[::2] - forces[1::2]
@@ -160,7 +160,7 @@ class Slopes:
         own[:, :, each, each] += p * (2 * a[..., :-1] + a[..., 1:]) / 3
         matrix = np.zeros((*a.shape[:2], 2 * count + 3, 2 * count + 3))
         lengths = slice(count + 3, None)
-        matrix[:, :, self._bend_columns(count), lengths] = bends * (self._bend * self._known)[..., None]
+        matrix[:, :, self._bend_columns(count), lengths] = bends * (self._bend * self._unknown)[..., None]
         matrix[:, :, count - 1, lengths] = p * self._free[:-1, :, :1]
         matrix[:, :, lengths, : count + 3] = matrix[:, :, : count + 3, lengths].swapaxes(2, 3)
         matrix[:, :, lengths, lengths] = own
