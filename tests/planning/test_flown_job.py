@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.zone import Zone
 from trajcli.planning import flown_job
 from trajcli.planning.flown_job import FlownCorner, FlyBy, chains, flown_corners
+from trajcli.planning.plan import Plan, plan_job
 
 
 def loaded(*moves: dict[str, Any], robot: Any = "planar2r", **fields: Any) -> LoadedJob:
@@ -59,6 +61,9 @@ def test_a_default_zone_that_cannot_be_is_a_remark_and_one_of_the_move_is_refuse
 ) -> None:
     found = flown_corners(loaded(*moves))
     assert [corner.move for corner in found.flown if corner.move == 0] == []
+    assert [remark.move for remark in found.remarks] == [
+        k for k in (0, len(moves) - 1) if moves[k] is not HOLD
+    ]
     first = found.remarks[0]
     assert (first.kind, first.move, first.message) == ("zone_stops", 0, f"stops at its end: {reason}")
     given = loaded({**moves[0], "zone": 0.03}, *moves[1:])
@@ -138,3 +143,32 @@ def test_an_aligned_chain_lasts_the_next_whole_number_of_periods(
 ) -> None:
     monkeypatch.setattr(flown_job, "stretched_chain", lambda chain, factor: chain.duration * factor)
     assert flown_job._aligned(SimpleNamespace(duration=duration), 100.0) == pytest.approx(periods / 100.0)  # type: ignore[arg-type]
+
+
+@cache
+def planned(zone: float, *, align: bool = False) -> Plan:
+    limits = {"velocity": 3, "acceleration": 8, "jerk": 60}
+    fields = {"limits": limits, "zone": zone, "output": {"rate": 100, "align": align}}
+    return plan_job(loaded(to(0.9, 1.25), to(1.0, 2.0), start={"joints": [0.3, 1.2]}, **fields))
+
+
+def test_a_zone_of_next_to_nothing_is_stopped_in_and_that_is_said() -> None:
+    made = planned(1e-12)
+    assert made.flyby is not None
+    assert made.flyby.chains is None
+    assert made.flyby.duration == made.flyby.stopping == made.trajectory.duration
+    assert made.flyby.best_bound is None
+    (event,) = made.events
+    assert (event.kind, event.move) == ("not_faster", 0)
+    assert f"{made.flyby.stopping:.6g}"[:6] in event.message
+    assert [(remark.kind, remark.move) for remark in made.remarks] == [("zone_stops", 1)]
+
+
+def test_a_job_that_is_aligned_flies_by_in_whole_periods() -> None:
+    free, aligned = planned(0.02), planned(0.02, align=True)
+    assert free.flyby is not None
+    assert aligned.flyby is not None
+    periods = 100 * aligned.trajectory.duration
+    assert periods == pytest.approx(round(periods), abs=1e-9)
+    assert 0 <= periods - 100 * free.trajectory.duration < 1
+    assert aligned.flyby.searched == pytest.approx(free.flyby.searched, rel=1e-9)
