@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from trajcli.errors import InputError
-from trajcli.job.limits import with_move_limits
+from trajcli.job.limits import looser_tool_bounds, with_move_limits
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.language.limits import LimitsSpec
 
@@ -121,3 +121,35 @@ def test_a_move_built_in_python_cannot_loosen_either() -> None:
     assert with_move_limits(robot, None, 0) is robot
     with pytest.raises(InputError, match="can only tighten limits"):
         with_move_limits(robot, spec, 3)
+
+
+@pytest.mark.parametrize("k", [0.25, 0.5, 1.0])
+def test_a_scale_of_velocities_is_that_of_every_speed(k: float) -> None:
+    """By position, where sqrt(2 d x) - o becomes k times that at every distance x; of the tool; of no acceleration."""
+    text = (
+        "version: 1\nrobot: fr3\nlimits: {{scale: {{velocity: {}}}, tcp: {{speed: 0.4, acceleration: 3}}}}\n"
+    )
+    text += "start: {{joints: [0, -0.8, 0, -2.3, 0, 1.6, 0.8]}}\nmoves: [{{planner: hold, duration: 1}}]\n"
+    plain, scaled = (job_from_text(text.format(factor)).robot.limits for factor in (1.0, k))
+    x = np.linspace(0.01, 2, 7)[:, None]
+    speeds = [
+        np.sqrt(2 * each.velocity_by_position[:, 0] * x) - each.velocity_by_position[:, 1]
+        for each in (plain, scaled)
+    ]
+    assert np.isfinite(speeds[0]).all()
+    np.testing.assert_allclose(speeds[1], k * speeds[0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(scaled.velocity, k * plain.velocity, rtol=1e-15)
+    assert (scaled.tcp.speed, scaled.tcp.acceleration) == (pytest.approx(0.4 * k), 3)
+
+
+@pytest.mark.parametrize(("more", "events"), [(1e-14, 0), (-1e-3, 0), (1e-10, 1), (1e-3, 1)])
+def test_the_same_limit_in_another_unit_is_not_looser(more: float, events: int) -> None:
+    velocity = 100 * DEG * (1 + more)
+    assert len(job(f"{{velocity: {{turn: {velocity!r} rad/s}}}}").events) == events
+
+
+@pytest.mark.parametrize(("speed", "looser"), [(0.4, []), (0.39, []), (0.4 * (1 + 1e-9), ["speed"])])
+def test_a_move_loosens_the_tool_by_more_than_rounding(speed: float, looser: list[str]) -> None:
+    robot = job("{tcp: {speed: 400, acceleration: 2000}}").robot
+    spec = LimitsSpec(tcp={"speed": speed})  # type: ignore[arg-type]
+    assert [name for name, _ in looser_tool_bounds(robot, spec)] == looser

@@ -107,6 +107,7 @@ def test_multiples_of_pi_are_fractions_in_lowest_terms():
             fractions, multiples_of_pi([sign * float(f) * np.pi for f in fractions]), strict=True
         ):
             assert value_of(text) == (sign * fraction.numerator, fraction.denominator), fraction
+    assert multiples_of_pi([-np.pi, np.pi / 2, -np.pi / 2, 3 * np.pi]) == ["-pi", "pi/2", "-pi/2", "3 pi"]
     none = [
         0.0,
         np.pi / 201,

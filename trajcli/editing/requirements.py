@@ -93,8 +93,8 @@ def _kept(requirements: Requirements, units: Units) -> KeptLimits:
 
 def new_jumps(before: EditedMotion, after: EditedMotion) -> list[Problem]:
     """Return what is discontinuous about a motion, as it is written, and was not before."""
-    known = {_kind(finding) for finding in _jumps(before)}
-    found = [finding for finding in _jumps(after.as_written()) if _kind(finding) not in known]
+    kinds = {_kind(finding) for finding in _jumps(before)}
+    found = [finding for finding in _jumps(after.as_written()) if _kind(finding) not in kinds]
     return [finding.problem(f"{before.rows.source}: {finding.text()}") for finding in found]
 
 
