@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -149,6 +149,7 @@ def flown_parts(
     states: Array,
     laws: CourseLaws,
     known: Mapping[int, FlownPart] | None = None,
+    doubtful: Collection[int] = (),
 ) -> list[FlownPart]:
     """Return the parts of the motion with given states at the nodes: courses and zones in turns.
 
@@ -158,22 +159,25 @@ def flown_parts(
         states: sd and sdd at the nodes, the ends included, (N, 2).
         laws: Of courses.
         known: Motions along courses that are known, by number.
+        doubtful: Courses that are tried before the others: where they fail, those are not looked for.
 
     Raises:
         NoLawError: When some courses have no law between their borders.
         PlanningError: When some zone has no motion.
     """
-    courses = dict(known or {})
-    failed: list[NoLawError] = []
-    for k, course in enumerate(chain.courses):
-        ends = states[2 * k : 2 * k + 2]
-        if k not in courses:
+    courses, numbers = dict(known or {}), range(len(chain.courses))
+    for some in ([k for k in numbers if k in doubtful], numbers):
+        failed: list[NoLawError] = []
+        for k in some:
+            if k in courses:
+                continue
+            ends, course = states[2 * k : 2 * k + 2], chain.courses[k]
             try:
                 courses[k] = laws.along(course, k, chain.stretch(k), ends, chain.tempos[k], row.parts[2 * k])
             except NoLawError as error:
                 failed.append(error)
-    if failed:
-        raise NoLawError(failed[0].reason, {k: s for error in failed for k, s in error.failing.items()})
+        if failed:
+            raise NoLawError(failed[0].reason, {k: s for error in failed for k, s in error.failing.items()})
     parts = [courses[0]]
     for k, corner in enumerate(chain.corners):
         before, behind = courses[k], courses[k + 1]

@@ -96,6 +96,7 @@ class MotionSearch:
         self._zones: dict[tuple[object, ...], list[Finding]] = {}
         self._laws, self._stopping = laws, StoppingLaws(laws)
         self._motion: _Motion
+        self._doubtful = set[int]()  # courses that have had no law
 
     def fastest(self, chain: FlyByChain) -> list[FlownPart]:
         """Return the parts of the fastest motion that is found: courses and zones in turns.
@@ -139,9 +140,12 @@ class MotionSearch:
         longest = _LONGER * found.duration
         while True:
             try:
-                return found, flown_parts(self.chain, row, found.states, self._laws, known)
+                return found, flown_parts(
+                    self.chain, row, found.states, self._laws, known, self._doubtful
+                )
             except NoLawError as error:
                 failed.append(error)
+                self._doubtful.update(error.failing)
             calm = {self._failing(index, s) for index, s in failed[-1].failing.items()}
             found = self._calmed(calm, row, found.states)
             if len(failed) > _CALMINGS or found.duration > longest:
