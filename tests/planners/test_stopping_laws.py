@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from tiers import few
 
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.findings import Finding
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.flying_by import flown_parts as looked_for
@@ -20,6 +22,7 @@ from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.chain_parts import BorderNode, PathPart
 from trajcli.planners.flying_by.flown_parts import (
     CourseLaws,
+    FlownPart,
     NoLawError,
     along_path,
     flown_parts,
@@ -329,3 +332,54 @@ def test_a_state_with_an_acceleration_where_only_speeds_count_is_rounded_to_one_
     speed, change = BorderNode(bounds, leads=True, goes_on=False).rounded(np.array([1e-7, 3.0]))
     assert speed == pytest.approx(1e-7, rel=1e-6)
     assert change == 0.0
+
+
+@pytest.mark.parametrize(("doubtful", "asked"), [((), [0, 1]), ({1}, [1])])
+def test_courses_that_had_no_law_are_tried_before_the_others(doubtful, asked, monkeypatch):
+    def found(course, number, stretch, states, tempo):
+        looked.append(number)
+        return refusing(1, 0, -1.0)(course, number, stretch, states, tempo)
+
+    chain, looked = chain_with("lines")[0], list[int]()
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    search.fastest(chain)
+    row, states = search._motion.row, search._motion.states
+    monkeypatch.setattr(looked_for, "_law_between", found)
+    with pytest.raises(NoLawError) as refused:
+        flown_parts(chain, row, states, CourseLaws(), None, doubtful)
+    assert (list(refused.value.failing), looked) == ([1], asked)
+
+
+def test_a_search_knows_which_course_had_no_law(monkeypatch):
+    """While it fails no other is looked for: laws of long paths cost most of the time of a search."""
+
+    def found(course, number, stretch, states, tempo):
+        looked.append(number)
+        return refusing(1, 0, 0.75 * asked)(course, number, stretch, states, tempo)
+
+    chain, looked = chain_with("lines")[0], list[int]()
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    search.fastest(chain)
+    states = search._motion.states
+    asked, search._laws = abs(states[2, 1]), CourseLaws()
+    monkeypatch.setattr(looked_for, "_law_between", found)
+    free = FoundStates(states, (search.model,))
+    search._flown(search._motion.row, free)
+    assert looked[:2] == [0, 1]
+    assert looked[2:] == [1] * (len(looked) - 3) + [0]
+    assert len(looked) > 4
+
+
+def test_what_joints_do_not_use_in_a_zone_is_lowered_at_once():
+    """The speed of the tool is too high by a tenth, while joints use a quarter of their velocities."""
+    chain, _ = chain_with("lines")
+    over = Finding("tool_speed", factor=1.1)
+    used = np.array([0.25, 0.9, 1.0])
+    for by_order, lowered in ((True, [0.25 / 1.1, 1.0, 1.0]), (False, 1.1**-POWERS)):
+        search = motion_search.MotionSearch(CourseLaws(), by_order=by_order)
+        assert search._kept_shares([over], used) == pytest.approx(np.array(lowered), rel=1e-5)
+    limits = chain.corners[0].limits
+    line = limits.velocity.max() / 4 * np.array([[[1.0, -0.5]], [[0.0, 0.0]]])
+    for times, share in ((1.0, 0.25), (-2.0, 0.5), (8.0, 1.0)):
+        motion = FlownPart(PiecewisePolynomial(np.array([0.0, 1.0]), times * line))
+        assert motion_search._used(motion, limits) == pytest.approx([share, 0.0, 0.0])

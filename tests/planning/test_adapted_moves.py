@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
+from trajcli.planners.planner import Planned
+from trajcli.planners.point_to_point.jerk_limited import JerkLimited
 from trajcli.planning.adaptation import Adaptation, proportions, without_bounds
 from trajcli.planning.plan import plan_job
 from trajcli.trajectory import resting
@@ -101,3 +104,22 @@ def test_moves_of_a_plan_are_stretched_repeated_and_slowed() -> None:
     kept = without_bounds(replace(first.planned, binding_phases=True))
     assert not kept.binding_phases
     assert kept.certificate is None
+
+
+def test_breaks_on_rows_are_given_up_where_another_law_is_as_fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A straight line within limits of the tool has a law of its own: asked again, it is the same."""
+
+    def counted(move: JerkLimited, *given: Any) -> Planned | None:
+        asked.append(given[-1])
+        return on_rows(move, *given)
+
+    asked, on_rows = list[float](), JerkLimited.on_rows
+    monkeypatch.setattr(JerkLimited, "on_rows", counted)
+    limits = {"velocity": 3, "acceleration": 8, "jerk": 60, "tcp": {"acceleration": 1.2}}
+    job = {"version": 1, "robot": "planar2r", "limits": limits, "start": {"joints": [0.3, 1.2]}}
+    move = {"planner": "jerk_limited", "to": {"joints": [0.9, 0.8]}, "when_over_limit": "slow"}
+    loaded = job_from_text(json.dumps({**job, "moves": [move]}))
+    made = plan_job(loaded, adapted=Adaptation(period=0.002))
+    assert made.verdict.passed
+    assert made.trajectory.duration == pytest.approx(plan_job(loaded).trajectory.duration, rel=1e-12)
+    assert len(asked) == 1

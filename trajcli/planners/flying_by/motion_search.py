@@ -14,10 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
+from trajcli.kinematics.robot import Limits
 from trajcli.limits.kinds import TOOL_KINDS
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.chain_parts import PathPart
@@ -93,7 +95,7 @@ class MotionSearch:
         self._paces: dict[int, float] = {}
         self._lowering = 0.0
         self._near: Array | None = None
-        self._zones: dict[tuple[object, ...], list[Finding]] = {}
+        self._zones: dict[tuple[object, ...], tuple[list[Finding], Array]] = {}
         self._laws, self._stopping = laws, StoppingLaws(laws)
         self._motion: _Motion
         self._doubtful = set[int]()  # courses that have had no law
@@ -140,9 +142,7 @@ class MotionSearch:
         longest = _LONGER * found.duration
         while True:
             try:
-                return found, flown_parts(
-                    self.chain, row, found.states, self._laws, known, self._doubtful
-                )
+                return found, flown_parts(self.chain, row, found.states, self._laws, known, self._doubtful)
             except NoLawError as error:
                 failed.append(error)
                 self._doubtful.update(error.failing)
@@ -212,7 +212,7 @@ class MotionSearch:
         for _ in range(_TRIES):
             states = np.where(bent[:, None], states * [_FASTER, _STEEPER], states)
             try:
-                if any(self._over(states)):
+                if any(findings for findings, _ in self._over(states)):
                     break
                 other = flown_parts(self.chain, self._motion.row, states, self._laws, known)
             except PlanningError:
@@ -255,33 +255,36 @@ class MotionSearch:
         if not self.chain.corners:
             return False
         shares = self.shares
-        lowered = shares * [self._kept_shares(findings) for findings in self._over(states)]
+        lowered = shares * [self._kept_shares(*each) for each in self._over(states)]
         self.chain = with_shares(self.chain, lowered)
         return bool((lowered < shares).any())
 
-    def _kept_shares(self, findings: Sequence[Finding]) -> Array:
+    def _kept_shares(self, findings: Sequence[Finding], used: Array) -> Array:
         """Return by what to lower velocity, acceleration and jerk of the joints, (3,), to keep limits.
 
-        A speed of the tool goes with those of the joints, its acceleration and jerk nearly so.
+        A speed of the tool goes with those of the joints, its acceleration and jerk nearly so; what joints
+        do not use (3,) is no help.
         """
         shares = np.ones(3)
         for finding in findings:
             order = _ORDERS.get(finding.kind) if self._by_order else None
             powers = POWERS if order is None else np.where(order == POWERS, POWERS, 0)
             if (finding.factor or 1.0) > 1.0:
-                shares = np.minimum(shares, ((finding.factor or 1.0) * (1 + _MORE)) ** -powers)
+                kept = ((finding.factor or 1.0) * (1 + _MORE)) ** -powers
+                shares = np.minimum(shares, kept if order is None else np.where(powers, kept * used, 1.0))
                 self.lowered |= order is not None
         return shares
 
-    def _over(self, states: Array) -> list[list[Finding]]:
-        """Return what is wrong with the motion through each zone."""
+    def _over(self, states: Array) -> list[tuple[list[Finding], Array]]:
+        """Return what is wrong with the motion through each zone, and what its joints use at most, (3,)."""
         over = []
         for k, corner in enumerate(self.chain.corners):
             borders = states[2 * k + 1 : 2 * k + 3]
             key = (k, corner.left, corner.joined, corner.shares, borders.tobytes())
             if key not in self._zones:
                 motion = zone_motion(self.chain, k, borders)
-                self._zones[key] = findings = findings_of(self.chain, 2 * k + 1, motion)
+                findings = findings_of(self.chain, 2 * k + 1, motion)
+                self._zones[key] = findings, _used(motion, corner.limits) if findings else np.ones(3)
                 if any(finding.kind.endswith("_jump") for finding in findings):
                     raise PlanningError(_STEPS)  # at any size and pace
             over.append(self._zones[key])
@@ -304,6 +307,16 @@ def with_shares(chain: FlyByChain, shares: Array) -> FlyByChain:
     """Return a chain whose zones use other parts of the limits of joints, (k, 3)."""
     corners = zip(chain.corners, shares.tolist(), strict=True)
     return replace(chain, corners=tuple(replace(corner, shares=tuple(each)) for corner, each in corners))
+
+
+def _used(motion: FlownPart, limits: Limits) -> Array:
+    """Return what joints use of their velocity, acceleration and jerk, at most 1, (3,)."""
+    extremes = peaks(motion.curve, POWERS.tolist())
+    used = [
+        np.maximum(peak.low / low, peak.high / high).max()
+        for peak, (low, high) in zip(extremes, (limits.of_order(k).T for k in POWERS), strict=True)
+    ]
+    return np.minimum(used, 1.0)
 
 
 def duration_of(parts: Sequence[FlownPart]) -> float:
