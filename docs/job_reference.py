@@ -24,7 +24,7 @@ from trajcli.language.waypoints import Waypoint
 from trajcli.planners import PLANNERS
 from trajcli.planners.planner import Planner
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
-from trajcli.planners.tool_path.defaults import Defaults
+from trajcli.planners.tool_path.line import Defaults
 
 _INTRODUCTION = """\
 A job is one YAML document. Numbers follow YAML 1.2; anchors, tags, duplicate keys, unknown keys, NaN

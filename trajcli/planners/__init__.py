@@ -122,7 +122,7 @@ class _ByName:
 
 def defaults_of_paths() -> type[Model]:
     """Return the model of what a job states for all its moves along paths."""
-    model: type[Model] = import_module("trajcli.planners.tool_path.defaults").Defaults
+    model: type[Model] = import_module("trajcli.planners.tool_path.line").Defaults
     return model
 
 

@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import cut, scale_time, times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.errors import Amount, Amounts
@@ -21,7 +20,7 @@ from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.boundary_states import instant
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import with_looser_limits
-from trajcli.planners.flying_by.flown_parts import FlownPart, move_part, state_at
+from trajcli.planners.flying_by.flown_parts import FlownPart, joint_uses, move_part, state_at
 from trajcli.planners.flying_by.within_limits import FlownChain
 from trajcli.planners.planner import Event, Phase, Planned, PlannedMove
 from trajcli.trajectory import MoveInterval, ViaPoints
@@ -209,14 +208,9 @@ def _squares_to(positions: Array, starts: Array, steps: Array, squares: Array) -
 
 def _binds(robot: Robot, curve: PiecewisePolynomial) -> str:
     """Return the limit of a joint of which a motion uses most, in words."""
-    best, words = 0.0, "nothing"
-    for order, extremes in zip((1, 2, 3), peaks(curve, (1, 2, 3)), strict=True):
-        low, high = robot.limits.of_order(order).T
-        used = np.maximum(extremes.low / low, extremes.high / high)
-        joint = int(used.argmax())
-        if used[joint] > best:
-            best, words = float(used[joint]), f"{QUANTITIES[order]} of {robot.joint_names[joint]}"
-    return words
+    used = joint_uses(curve, robot.limits)
+    order, joint = divmod(int(used.argmax()), used.shape[1])
+    return f"{QUANTITIES[order + 1]} of {robot.joint_names[joint]}" if used.max() > 0 else "nothing"
 
 
 def moves_as_flown(moves: Sequence[PlannedMove], chain: FlownChain) -> Iterator[PlannedMove]:

@@ -18,7 +18,7 @@ from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import Limits, Robot
 from trajcli.limits.kinds import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
@@ -352,6 +352,13 @@ def move_part(chain: FlyByChain, number: int, part: FlownPart, start: float) -> 
     if in_zone:
         return MoveInterval(start, end, chain.corners[k].robot, None, chain.corners[k].around)
     return MoveInterval(start, end, chain.courses[k].robot, part.tool)
+
+
+def joint_uses(curve: PiecewisePolynomial, limits: Limits) -> Array:
+    """Return what part of their limits of velocity, acceleration and jerk joints use at most, (3, n)."""
+    bounds = (limits.of_order(order).T for order in (1, 2, 3))
+    extremes = zip(peaks(curve, (1, 2, 3)), bounds, strict=True)
+    return np.array([np.maximum(peak.low / low, peak.high / high) for peak, (low, high) in extremes])
 
 
 def state_at(curve: PiecewisePolynomial, time: float) -> State:

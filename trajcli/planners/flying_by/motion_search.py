@@ -14,12 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from trajcli.curves.extrema import peaks
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import Limits
 from trajcli.limits.kinds import TOOL_KINDS
 from trajcli.planners.flying_by.between_stops import FlyByChain
 from trajcli.planners.flying_by.chain_parts import PathPart
@@ -29,6 +27,7 @@ from trajcli.planners.flying_by.flown_parts import (
     NoLawError,
     findings_of,
     flown_parts,
+    joint_uses,
     zone_motion,
 )
 from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
@@ -284,7 +283,8 @@ class MotionSearch:
             if key not in self._zones:
                 motion = zone_motion(self.chain, k, borders)
                 findings = findings_of(self.chain, 2 * k + 1, motion)
-                self._zones[key] = findings, _used(motion, corner.limits) if findings else np.ones(3)
+                used = np.minimum(joint_uses(motion.curve, corner.limits).max(axis=1), 1.0)
+                self._zones[key] = findings, used
                 if any(finding.kind.endswith("_jump") for finding in findings):
                     raise PlanningError(_STEPS)  # at any size and pace
             over.append(self._zones[key])
@@ -307,16 +307,6 @@ def with_shares(chain: FlyByChain, shares: Array) -> FlyByChain:
     """Return a chain whose zones use other parts of the limits of joints, (k, 3)."""
     corners = zip(chain.corners, shares.tolist(), strict=True)
     return replace(chain, corners=tuple(replace(corner, shares=tuple(each)) for corner, each in corners))
-
-
-def _used(motion: FlownPart, limits: Limits) -> Array:
-    """Return what joints use of their velocity, acceleration and jerk, at most 1, (3,)."""
-    extremes = peaks(motion.curve, POWERS.tolist())
-    used = [
-        np.maximum(peak.low / low, peak.high / high).max()
-        for peak, (low, high) in zip(extremes, (limits.of_order(k).T for k in POWERS), strict=True)
-    ]
-    return np.minimum(used, 1.0)
 
 
 def duration_of(parts: Sequence[FlownPart]) -> float:

@@ -1,4 +1,4 @@
-"""Straight lines, pure rotations, and screw motions of the tool."""
+"""Straight lines, pure rotations and screw motions of the tool, and what a job says of all its paths."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from trajcli.geometry.paths.orientation import FixedOrientation
 from trajcli.geometry.paths.pose import PoseCurve, Screw
 from trajcli.geometry.paths.position import SAME_POINT, Line, Pivot
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import refuse
+from trajcli.language.numbers import Model, refuse
 from trajcli.language.points import NamedTarget
 from trajcli.language.targets import Target
+from trajcli.planners.tool_path.law import LawSpec
 from trajcli.planners.tool_path.move import (
+    Orientation,
     PlannedPath,
+    ToleranceSpec,
     ToolPathMove,
     ToolTarget,
     flaws_of_target,
@@ -93,3 +96,17 @@ class ScrewMove(ToolPathMove):
 def _path_of_no_length(before: Array, target: ToolTarget, to: Target) -> PlannedPath:
     poses = PoseCurve(Pivot(before[:3, 3], target.pose[:3, 3], 0.0), FixedOrientation(before[:3, :3], 0.0))
     return path_of_poses(poses, target, to)
+
+
+class Defaults(Model):
+    """What holds for every line, arc, path and screw that does not say otherwise."""
+
+    law: Annotated[
+        LawSpec | None,
+        Field(
+            description="Key by key, but for a law that names a shape or a duration; without a shape it is "
+            "time_optimal."
+        ),
+    ] = None
+    tolerance: Annotated[ToleranceSpec | None, Field(description="Key by key.")] = None
+    orientation: Annotated[Orientation | None, Field(description="Of those that have one.")] = None
