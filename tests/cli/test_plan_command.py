@@ -195,6 +195,7 @@ WRONG_OPTIONS = [
     (("-o", "a.mcap", "--epoch", "nan"), "expected seconds since 1970, got 'nan'"),
     (("-o", "a.mcap", "--epoch", "3e9"), "expected seconds since 1970, got '3e9'"),
     (("-o", "a.mcap", "--epoch", "3000000000"), "times of ROS 2 end at 2147483647 s"),
+    (("-o", "a.mcap", "--epoch", "9" * 400), "the log would reach 1.00000000000e+400 s"),
     (("-o", "a.mcap", "--epoch", "2147483646.5"), "the log would reach 2147483647.5 s"),
     (("-o", "a.mcap", "--set", "output.start_time=-2"), "--epoch 2 or more makes that possible"),
     (

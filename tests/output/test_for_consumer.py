@@ -18,12 +18,14 @@ from random_jobs import loaded as job_of
 from tiers import few
 
 import trajcli
+from trajcli.consumers.judgement import load_profile
+from trajcli.consumers.profile import WantedRows
 from trajcli.curves.operations import scale_time
 from trajcli.errors import VerificationError
 from trajcli.grids import KnotGrid, UniformGrid
 from trajcli.job.read import job_from_text, load_job
 from trajcli.output.consumer import job_for
-from trajcli.output.delivery.for_consumer import ForConsumer, Writing, plan_for
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, _Search, plan_for
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.delivery.slower_motion import StretchedMoves
 from trajcli.output.write import grid_of
@@ -271,6 +273,13 @@ def test_moves_are_planned_once_for_whatever_rows_are_tried(
     with suppress(VerificationError):
         assert isinstance(plan_for(*job_for(loaded, "ros-jtc", {}), Writing()).grid, KnotGrid)
     assert len(planned) == 3
+
+
+def test_the_rate_of_a_consumer_is_advised_to_the_last_bit() -> None:
+    loaded = load_job(str(EXAMPLES / "septic.yaml"), ("output={rate: 7}",))
+    profile = replace(load_profile("ur-servoj"), rows=WantedRows(("t", "q"), 2000 / 3, align=False))
+    (option,) = _Search(loaded, profile, Writing(), None)._said_by_job()
+    assert float(option.removeprefix("--rate ")) == 2000 / 3
 
 
 def test_rows_at_a_rate_and_at_knots_are_called_both() -> None:

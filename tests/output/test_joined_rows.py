@@ -16,7 +16,7 @@ from trajcli.grids import ListedGrid, UniformGrid
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.output.delivery import joined_rows as module
-from trajcli.output.delivery.joined import joined_rows, rows_report, rows_that_keep, with_event
+from trajcli.output.delivery.joined import OtherRows, joined_rows, rows_report, rows_that_keep, with_event
 from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
@@ -110,6 +110,14 @@ def test_of_very_many_rows_only_those_about_breaks_are_looked_at(monkeypatch: py
         }
         assert needed <= chosen
         assert list(rows._unproven_blocks(grid, degree)) == sorted(chosen)
+
+
+@pytest.mark.parametrize("rate", [666.666666666, 8000 / 3, 1 / 3, 62.5, 1000.0])
+def test_an_option_names_its_rate_to_the_last_bit(rate: float) -> None:
+    plan = planned("septic")
+    rows = joined_rows(plan, grid_of(plan), FORMATS["csv"])
+    loaded = load_job(EXAMPLES / "septic.yaml", rate=OtherRows(rows, {"rate": rate}).options.split()[1])
+    assert loaded.job.output.rate == rate
 
 
 @pytest.mark.full

@@ -58,7 +58,7 @@ def dump_job(loaded: LoadedJob) -> str:
         "frames": {key: frame for key, frame in written["frames"].items() if key == job.output.frame},
         "points": written["points"],
         "start": written["start"],
-        "zone": written.get("zone"),
+        "zone": written.get("zone", {}),
         "moves": [],
         "when_over_limit": job.when_over_limit,
         "output": written["output"],
@@ -66,8 +66,6 @@ def dump_job(loaded: LoadedJob) -> str:
     if robot.foot is not None and job.output.frame == "base":
         ordered["frames"] = {_STAND: Pose("").write(robot.stand, context)}
         ordered["output"]["in"] = _STAND
-    if ordered["zone"] is None:
-        ordered.pop("zone")
     if job.output.times is not None:
         ordered["output"].pop("rate")
     return "\n".join(_block({**_without_empty(ordered), "moves": moves})) + "\n"
@@ -107,7 +105,7 @@ def robot_as_mapping(robot: Robot, *, plain: bool = False) -> dict[str, Any]:
         plain: Whether numbers are without units, for a file in rad and m; else they carry theirs, for a job
             of any units.
     """
-    say: Callable[[float, Quantity], float | str] = _plain_number if plain else written_number
+    say: Callable[[float, Quantity], float | str] = (lambda value, _: value) if plain else written_number
     described = robot.convention is not None
     keys = {"convention": robot.convention} if described else {}
     joints = [_joint_as_mapping(robot, index, say, described=described) for index in range(len(robot.joints))]
@@ -121,11 +119,6 @@ def robot_as_mapping(robot: Robot, *, plain: bool = False) -> dict[str, Any]:
         for key, pose in turned.items()
     }
     return {"name": robot.name, **keys, "joints": joints, **written}
-
-
-def _plain_number(value: float, quantity: Quantity) -> float:
-    del quantity
-    return value
 
 
 def _joint_as_mapping(

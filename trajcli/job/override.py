@@ -159,7 +159,7 @@ def _default(document: Document, path: _Steps, step: str | int) -> Any:  # noqa:
     if (
         key in ("xyz", "rpy")
         and above
-        and (above in (["base"], ["tool"]) or above[0] in ("frames", "tools") or above[-1] == "offset")
+        and (above[0] in ("base", "tool", "frames", "tools") or above[-1] == "offset")
     ):
         return [0, 0, 0]
     if path in (("base",), ("tool",)):

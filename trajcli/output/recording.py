@@ -148,7 +148,7 @@ def _origin(options: LogOptions, start_time: float, duration: float = 0.0) -> in
             f"a log begins at 0 s or later, and output.start_time is {start_time:g} s",
             hint=f"--epoch {Decimal(epoch - origin) / _PER_SECOND:f} or more makes that possible",
         )
-    end = origin / _PER_SECOND + duration
+    end = Decimal(origin) / _PER_SECOND + Decimal(duration)
     if end > _LATEST:
         raise InputError(
             f"the log would reach {end:.12g} s, and times of ROS 2 end at {_LATEST} s",

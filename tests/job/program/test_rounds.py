@@ -166,6 +166,9 @@ WRONG = [
     ("  - {repeat: [slot, slot], moves: [{call: place}]}\n", 2, "different names", None),
     ("  - {repeat: 2}\n", 2, "needs `moves`", None),
     ("  - {repeat: 2, moves: []}\n", 2, "empty", None),
+    ("  - {repeat: 2, label: [x], moves: [{call: place}]}\n", 2, "expected a text, got a list", None),
+    ("  - {call: rest, label: {x: 1}}\n", 2, "expected a text, got a mapping", None),
+    ("  - call: [place]\n", 2, "expected the name of a sequence", None),
     ("  - call: place\n", 0, "'slot' is many (6)", "{repeat: slot, moves: [...]}"),
     ("  - {planner: quintic, to: above}\n", 2, "'slot' is many (6)", "repeat: slot"),
     ("  - call: again\n", -1, "the sequence 'again' calls itself (again -> again)", None),
@@ -197,6 +200,40 @@ def test_a_wrong_program_is_refused_on_its_line(move: str, line: int, message: s
     assert hint is None or hint in (problem.hint or "")
     assert problem.place is not None
     assert problem.place.line == line
+
+
+def test_a_sequence_that_nobody_calls_is_no_longer_than_others() -> None:
+    """It is read, too: without a bound, thirty million rounds of a hold fill the memory."""
+    text = SECTIONS.replace("[{call: again}]", "[{repeat: 30000000, moves: [{call: rest}]}]")
+    with pytest.raises(InputError, match="30000000 entries") as caught:
+        job_from_text(HEAD + text + "  - call: rest\n")
+    (problem,) = caught.value.problems
+    assert problem.place is not None
+    assert problem.place.source.startswith("  again:")
+
+
+OUTSIDE = [  # what stands in no round: what it names, a name that is many
+    ("start: two", "two"),
+    ("start: {from: above, offset: {xyz: [0, 0, 10]}}", "slot"),
+    ("start: above", "slot"),
+    ("output: {in: work}", "work"),
+    ("output: {in: shifted}", "work"),
+]
+
+
+@pytest.mark.parametrize(("line", "many"), OUTSIDE)
+def test_start_and_output_name_none_that_is_many(line: str, many: str) -> None:
+    head = HEAD if line.startswith("output") else HEAD[: HEAD.index("start: ")]
+    frames = (
+        "frames:\n  left: {}\n  right: {}\n  work: [left, right]\n  shifted: {in: work, xyz: [1, 0, 0]}\n"
+    )
+    text = SECTIONS.replace("  again: [{call: again}]\n", "").replace("sequences:", frames + "sequences:")
+    with pytest.raises(InputError, match=rf"'{many}' is many \([0-9]\), and no round") as caught:
+        job_from_text(f"{head}{line}\n{text}  - call: rest\n")
+    (problem,) = caught.value.problems
+    assert problem.hint == "name one of them"
+    assert problem.place is not None
+    assert problem.place.source == line
 
 
 POINTS = [

@@ -10,7 +10,7 @@ from trajcli.frozen import frozen
 from trajcli.job.program.many import MOST_ENTRIES, SECTIONS, ManyNames, Rounds, fields_of
 from trajcli.job.program.parts import Parts
 from trajcli.job.yaml.document import Document, Node
-from trajcli.language.numbers import ReadingContext
+from trajcli.language.numbers import ReadingContext, shown
 from trajcli.suggest import did_you_mean, valid_names
 from trajcli.units import Units
 
@@ -126,13 +126,12 @@ class _Expansion:
 
     def document(self) -> ExpandedDocument:
         moves = self._document.node(("moves",))
-        listed = moves is not None and isinstance(moves.value, list)
-        if moves is None or not listed:
+        if moves is None or not isinstance(moves.value, list):
             raise self._names.refused("expected a list of moves", ("moves",))
-        count = self._count(moves, ("moves",), frozenset(), ())
-        if count > MOST_ENTRIES:
-            message = f"the moves are {count} entries when repeats and calls are written out"
-            raise self._names.refused(f"{message}, expected at most {MOST_ENTRIES}", ("moves",))
+        self._count(moves, ("moves",), frozenset(), ())
+        for path in (("start",), ("output", "in")):
+            if (node := self._document.node(path)) is not None:
+                self._check_bound(node, path, frozenset(), "name one of them")
         called = {name for name, _ in self._counted}
         entries = list(self._entries(moves, ("moves",), {}, ""))
         rest = {name: self._uncalled(name) for name in self._sequences if name not in called}
@@ -191,16 +190,26 @@ class _Expansion:
                 for part in parts:
                     self._check_bound(part.node, here, bound)
                 total += len(parts)
+        if total > MOST_ENTRIES:
+            message = f"the moves are {total} entries when repeats and calls are written out"
+            raise self._names.refused(f"{message}, expected at most {MOST_ENTRIES}", path)
         return total
 
+    def _only(self, entry: Node, keys: tuple[str, ...], path: _Path) -> None:
+        """Refuse other keys than these and a label, and what is no label."""
+        self._names.only(entry, (*keys, "label"), path)
+        label = entry.child("label")
+        if label is not None and not isinstance(label.value, str):
+            message = f"expected a text, got {shown(label.plain())}"
+            raise self._names.refused(message, (*path, "label"))
+
     def _count_repeat(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
-        self._names.only(entry, ("repeat", "moves", "label"), path)
+        self._only(entry, ("repeat", "moves"), path)
         over, moves = entry.child("repeat"), entry.child("moves")
         if over is None or moves is None:
             raise self._names.refused("a repeat needs `moves`", path, "such as {repeat: 3, moves: [...]}")
-        count, names = self._rounds(
-            over, (*path, "repeat")
-        )  # of two of a name, one in the other, the inner counts
+        # of two of a name, one in the other, the inner counts
+        count, names = self._rounds(over, (*path, "repeat"))
         for name in names:
             left = [one for one in self._names.needs(name) if one not in (*bound, *names)]
             if left:
@@ -232,15 +241,16 @@ class _Expansion:
         return counts[names[0]], names
 
     def _count_call(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
-        self._names.only(entry, ("call", "label"), path)
-        called, at = entry.child("call"), (*path, "call")
-        name = None if called is None else called.value
-        if not isinstance(name, str) or name not in self._sequences:
-            known = self._sequences
-            hint = did_you_mean(str(name), known) or valid_names(known, "sequences")
-            raise self._names.refused(
-                f"there is no sequence '{name}'", at, hint or "the job has no `sequences`"
+        self._only(entry, ("call",), path)
+        at, known = (*path, "call"), self._sequences
+        name = fields_of(entry)["call"].value
+        if not isinstance(name, str):
+            raise self._names.refused("expected the name of a sequence", at)
+        if name not in known:
+            hint = (
+                did_you_mean(name, known) or valid_names(known, "sequences") or "the job has no `sequences`"
             )
+            raise self._names.refused(f"there is no sequence '{name}'", at, hint)
         if name in chain:
             circle = " -> ".join([*filter(None, chain[chain.index(name) :]), name])
             raise self._names.refused(f"the sequence '{name}' calls itself ({circle})", at)
@@ -252,12 +262,12 @@ class _Expansion:
             self._counted[key] = counted
         return self._counted[key]
 
-    def _check_bound(self, entry: Node, path: _Path, bound: frozenset[str]) -> None:
-        """Refuse a move that names one of many where no round says which."""
+    def _check_bound(self, entry: Node, path: _Path, bound: frozenset[str], hint: str = "") -> None:
+        """Refuse a move, or what no round holds, that names one of many where no round says which."""
         for name in self._names.needs_of(entry):
             if name not in bound:
                 message = f"'{name}' is many ({self._names.counts[name]}), and no round says which is meant"
-                hint = f"write the move within `- {{repeat: {name}, moves: [...]}}`"
+                hint = hint or f"write the move within `- {{repeat: {name}, moves: [...]}}`"
                 raise self._names.refused(message, path, hint)
 
     def _not_too_deep(self, depth: int, path: _Path) -> None:
@@ -278,13 +288,12 @@ class _Expansion:
                 count, names = self._rounds(keys["repeat"], (*here, "repeat"))
                 for number in range(count):
                     now = {**rounds, **dict.fromkeys(names, number)}
-                    said = self._names.words(now, names) or f"round {number + 1} of {count}"
-                    said = _phrase(words, label, said)
+                    counted = self._names.words(now, names)
+                    said = _phrase(words, label, counted or f"round {number + 1} of {count}")
                     yield from self._entries(keys["moves"], (*here, "moves"), now, said, depth + 1)
             elif "call" in keys:
                 name = str(keys["call"].value)
-                at = ("sequences", name)
-                said = _phrase(words, label)
+                at, said = ("sequences", name), _phrase(words, label)
                 yield from self._entries(self._sequences[name], at, rounds, said, depth + 1)
             else:
                 for part in self._parts.of(entry, here):

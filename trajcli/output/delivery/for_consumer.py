@@ -265,12 +265,13 @@ class _Search:
             job = loaded.job.model_copy(update={"output": output.model_copy(update=other.output)})
             found = self.judged(replace(made.plan, loaded=replace(loaded, job=job)))
             if found.clean:
-                words = ["rows at its knots"] if "rows" in other.output else []
-                words += [f"rows at {other.output['rate']:g} Hz"] if "rate" in other.output else []
-                words += (
-                    [f"columns {', '.join(other.output['columns'])}"] if "columns" in other.output else []
+                words = " and ".join(
+                    f"columns {', '.join(value)}"
+                    if key == "columns"
+                    else f"rows at {'its knots' if key == 'rows' else f'{value:g} Hz'}"
+                    for key, value in other.output.items()
                 )
-                text = f"{' and '.join(words)} keep all limits as {self._profile.name} joins them"
+                text = f"{words} keep all limits as {self._profile.name} joins them"
                 return _with_event(found, "other_rows", text), other.output
         return None
 
@@ -416,22 +417,20 @@ class _Search:
                     set_columns(columns),
                 ]
                 instead = " in place of `--for`"
-            duration = first.duration
-            yield f"`{' '.join(options)}`{instead} keeps all limits, with {duration:.6g} s as now"
+            yield f"`{' '.join(options)}`{instead} keeps all limits, with {first.duration:.6g} s as now"
         job = self._loaded.job.model_copy(update={"when_over_limit": "slow"})
         slow = _Search(replace(self._loaded, job=job), self._profile, self._writing, self._carried)
         slow._begun = self._begun.where_slowed()
         slower = slow.slower(first)
         if slower.keeps:
-            duration = slower.duration
-            yield f"`--set when_over_limit=slow` keeps all limits, with {duration:.6g} s"
+            yield f"`--set when_over_limit=slow` keeps all limits, with {slower.duration:.6g} s"
 
     def _said_by_job(self) -> Iterator[str]:
         """Yield options for what the job says of its rows, which goes before a consumer that it names."""
         wanted, document = self._profile.rows, self._loaded.document
         output = self._loaded.job.output
         if wanted.rate is not None and document.node(("output", "rate")) is not None:
-            yield f"--rate {wanted.rate:g}"
+            yield f"--rate {wanted.rate}"
         if document.node(("output", "rows")) is not None and output.rows in (None, "rate"):
             yield "--rows rate"
         if wanted.align and document.node(("output", "align")) is not None:

@@ -107,10 +107,9 @@ class OtherRows:
     @property
     def options(self) -> str:
         """Options of `trajcli plan` that make them."""
-        named = {key: value for key, value in self.output.items() if key != "columns"}
-        words = [f"--{key} {f'{value:g}' if key == 'rate' else value}" for key, value in named.items()]
         return " ".join(
-            [*words, *([set_columns(self.output["columns"])] if "columns" in self.output else [])]
+            set_columns(value) if key == "columns" else f"--{key} {value}".removesuffix(".0")
+            for key, value in self.output.items()
         )
 
 

@@ -105,6 +105,4 @@ def arranged(layout: MessageLayout, count: int) -> NDArray[Any]:
 
 def put_time(messages: NDArray[Any], name: str, nanoseconds: NDArray[np.int64]) -> None:
     """Fill in a time of structures (N,) with nanoseconds (N,), none negative."""
-    seconds = nanoseconds // 1_000_000_000
-    messages[f"{name}.sec"] = seconds
-    messages[f"{name}.nanosec"] = nanoseconds - seconds * 1_000_000_000
+    messages[f"{name}.sec"], messages[f"{name}.nanosec"] = np.divmod(nanoseconds, 1_000_000_000)

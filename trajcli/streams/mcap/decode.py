@@ -226,13 +226,11 @@ def _fits(raw: Bytes, layout: StateLayout) -> NDArray[np.bool_]:
 
 
 def _stamps(raw: Bytes, order: str) -> NDArray[np.int64]:
-    parts = np.ascontiguousarray(raw[:, 4:12]).view(
-        np.dtype([("sec", order + "i4"), ("nanosec", order + "u4")])
+    seconds, nanoseconds = (
+        np.ascontiguousarray(raw[:, at : at + 4]).view(order + kind)[:, 0].astype(np.int64)
+        for at, kind in ((4, "i4"), (8, "u4"))
     )
-    stamps: NDArray[np.int64] = parts["sec"][:, 0].astype(np.int64) * 1_000_000_000 + parts["nanosec"][
-        :, 0
-    ].astype(np.int64)
-    return stamps
+    return seconds * 1_000_000_000 + nanoseconds
 
 
 def joint_trajectory(message: bytes) -> JointSeries:

@@ -236,9 +236,8 @@ class _Log:
             self._latched.append((topics[topic], time, record))
             counts[topic] += 1
         self._origin = recording.origin
-        self._buffer = np.empty(
-            0, np.uint8
-        )  # of a chunk: a new one each time would cost as much as filling it
+        # of a chunk: a new one each time would cost as much as filling it
+        self._buffer = np.empty(0, np.uint8)
         self._write(records.MAGIC + records.record(records.HEADER, *map(records.text, (PROFILE, LIBRARY))))
         self._about = _schemas_and_channels(topics)
         self._schemas = len({type_of(topic) for topic in topics})
