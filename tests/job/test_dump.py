@@ -14,8 +14,9 @@ from random_mappings import jobs
 from tiers import few
 
 from trajcli.errors import InputError
-from trajcli.job.dump import dump_job, mapping_text
+from trajcli.job.dump import dump_job, dump_robot, mapping_text
 from trajcli.job.read import LoadedJob, job_from_text, load_job
+from trajcli.job.robot import read_sheet
 from trajcli.planners.planner import Planner
 from trajcli.planning.plan import plan_job
 
@@ -67,6 +68,92 @@ def test_the_resolved_example_gives_the_same_curve(example: Path) -> None:
     assert np.array_equal(curves[0].coefficients, curves[1].coefficients)
 
 
+RICH = """
+version: 1
+units: {angle: deg, length: mm}
+robot:
+  name: two
+  convention: modified
+  joints:
+    - {a: 10, beta: 0, position: [-90, 90], velocity: 90, effort: 3,
+       link: {mass: 2, com: [1, 2, 3], inertia: [1, 1, 1, 0, 0, 0]}}
+    - {a: 400, beta: 0.01, type: prismatic, position: [-1000, 2000], velocity: [-100, 200], sign: -1,
+       velocity_by_position: {deceleration: 300, offset: 20}, acceleration: 70,
+       link: {mass: 1, com: [0, 0, 0], inertia: [1, 1, 1, 0, 0, 0]}}
+  tool: {xyz: [1, 2, 3]}
+base: {xyz: [10, 20, 30], rpy: [1, 2, 3]}
+frames: {f: {xyz: [4, 5, 6], rpy: [7, 8, 9]}, unused: {}}
+tools: {grip: {xyz: [0, 0, 50], mass: 2}, light: {xyz: [0, 0, 7]}}
+gravity: [0, 9.81, 0]
+limits: {effort: robot, tcp: {speed: 500}}
+zone: {joints: [1, 2]}
+start: {joints: [0, 0]}
+when_over_limit: slow
+moves:
+  - {planner: quintic, to: {joints: [10, 10]}, label: there}
+  - attach: {mass: 1, com: [0, 0, 10]}
+  - detach: {}
+  - tool: grip
+  - {planner: quintic, to: {joints: [0, 0]}, zone: stop}
+output: {in: f, times: [0, 0.1]}
+"""
+
+
+@pytest.mark.parametrize(
+    "more", ["", "tool: grip", "tool: light", "tool: {mass: 3, xyz: [1, 0, 0]}", "tool: {xyz: [1, 0, 0]}"]
+)
+def test_what_a_job_says_beside_its_moves_is_kept(more: str) -> None:
+    for text in (f"{RICH}{more}\n", f"{RICH}{more}\n".replace("effort: robot", "effort: {j2: 5}")):
+        first = job_from_text(text)
+        second = job_from_text(dump_job(first))
+        assert_same(first, second)
+        for key in ("gravity", "zone"):
+            assert getattr(first.job, key) == getattr(second.job, key)
+        for key in ("velocity_by_position", "effort"):
+            assert np.array_equal(getattr(first.robot.limits, key), getattr(second.robot.limits, key))
+        assert first.robot.limits.tcp == second.robot.limits.tcp
+        assert first.robot.equipment == second.robot.equipment
+        assert first.robot.tool_name == second.robot.tool_name
+        assert np.array_equal(first.robot_of_rows.base, second.robot_of_rows.base)
+
+
+def test_the_frame_of_rows_of_a_robot_on_a_rail_is_where_the_rail_stands() -> None:
+    text = RICH.replace("\nrobot:\n", "\nrobot:\n rail: {axis: y, name: rail}\n arm:\n").replace(
+        "joints: [0, 0]}", "joints: 0}"
+    )
+    text = text.replace("joints: [10, 10]", "joints: 10").replace("in: f,", "in: base,")
+    first = job_from_text(text.replace("zone: {joints: [1, 2]}\n", "").replace("effort: robot, ", ""))
+    second = job_from_text(dump_job(first))
+    assert np.array_equal(first.robot_of_rows.base, second.robot_of_rows.base)
+    assert not np.array_equal(first.robot.base, first.robot_of_rows.base)
+
+
+def test_a_robot_file_keeps_where_the_robot_is_from(tmp_path: Path) -> None:
+    beside = {"source": "a book", "licence": "CC0", "note": "measured"}
+    file = tmp_path / "arm.yaml"
+    robot: dict[str, Any] = {"name": "arm", "joints": [{"velocity": 3}], **beside}
+    file.write_text(json.dumps(robot))
+    sheet = read_sheet(str(file))
+    other = tmp_path / "other.yaml"
+    other.write_text(dump_robot(sheet))
+    again = read_sheet(str(other))
+    for key, text in beside.items():
+        assert getattr(again, key) == getattr(sheet, key) == text
+
+
+def test_values_of_python_are_written_as_those_of_a_job() -> None:
+    text = mapping_text({"a": Path("b") / "c", "d": np.array([1.5, 2]), "e": (np.int64(3), np.inf, -np.inf)})
+    assert text == 'a: "b/c"\nd: [1.5, 2.0]\ne: [3, .inf, -.inf]\n'
+    assert mapping_text({"n": float("nan")}) == "n: .nan\n"
+    with pytest.raises(InputError, match="the job's a: expected texts as keys, got 1"):
+        mapping_text({"a": {1: 2}})
+    deep: Any = 1
+    for _ in range(150):
+        deep = [deep]
+    with pytest.raises(InputError, match="more than 100 levels deep"):
+        mapping_text({"a": deep})
+
+
 def test_what_a_resolved_job_looks_like() -> None:
     text = dump_job(
         job_from_text(
@@ -110,6 +197,8 @@ output: {rate: 1000.0, start_time: 0.0, align: false, columns: [t, q, qd, qdd]}
     "name",
     [
         "true",
+        "Null",
+        "FALSE",
         "~",
         "1",
         "1e3",

@@ -9,6 +9,7 @@ import pytest
 
 from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob, load_job
+from trajcli.job.yaml.load import MAX_DEPTH
 
 JOB = """\
 version: 1
@@ -35,6 +36,7 @@ def moved(loaded: LoadedJob) -> object:
 
 SETTINGS = [  # settings, what came of them
     (["moves.0.duration=3"], {"planner": "quintic", "duration": 3.0}),
+    ([" moves.0.duration = 3"], {"planner": "quintic", "duration": 3.0}),
     (["moves.0.duration=3 ms"], {"planner": "quintic", "duration": 0.003}),
     (["moves.0.duration=3", "moves.0.duration=4"], {"planner": "quintic", "duration": 4.0}),
     (["moves.0={planner: hold, duration: 5}"], {"planner": "hold", "duration": 5.0}),
@@ -93,6 +95,18 @@ WRONG = [  # settings, rate, message, place
         None,
         "expected a number above 0 s, got -2",
         "--set moves.0={planner: quintic, to: a, duration: -2}:1:37",
+    ),
+    (
+        ["moves.0={planner: quintic, to: a, duration: 2}", "moves.0.duration=-3"],
+        None,
+        "expected a number above 0 s, got -3",
+        "--set moves.0.duration=-3:1:1",
+    ),
+    (
+        ["a" + ".a" * MAX_DEPTH + "=1"],
+        None,
+        f"--set {('a.' * 20)}...: a path of {MAX_DEPTH + 1} parts, a job is at most {MAX_DEPTH} levels deep",
+        None,
     ),
     ([], "fast", 'expected a frequency such as "500 Hz", got "fast"', "--rate fast:1:1"),
     ([], "0", "expected a number above 0 Hz, got 0", "--rate 0:1:1"),
@@ -168,6 +182,52 @@ def test_a_limit_of_one_joint_leaves_the_others(arm: Path) -> None:
     once = load_job(arm, ["limits={velocity: [1, 2, 3, 4, 5, 6]}", "moves.0.limits.velocity.2=2"])
     assert once.job.moves[0].limits.velocity[2] == pytest.approx(np.radians([-2, 2]))
     assert once.job.moves[0].limits.velocity[5] == pytest.approx(np.radians([-6, 6]))
+
+
+REST = [  # lines of a job, a setting, the same written out
+    ("frames: {f: {rpy: [10, 20, 30]}}", "frames.f.xyz.1=7", "frames.f.xyz=[0, 7, 0]"),
+    ("frames: {f: {xyz: [1, 2, 3]}}", "frames.f.rpy.2=7", "frames.f.rpy=[0, 0, 7]"),
+    ("tools: {t: {rpy: [10, 20, 30]}}", "tools.t.xyz.2=7", "tools.t.xyz=[0, 0, 7]"),
+    ("tools: {t: {mass: 2}}", "tools.t.com.2=7", "tools.t.com=[0, 0, 7]"),
+    ("points: {p: {joints: 3}}", "points.p.velocity.3=7", "points.p.velocity=[0, 0, 0, 7, 0, 0]"),
+    ("", "moves.0.to={from: here, offset: {rpy: [1, 2, 3]}}", "moves.0.to.offset.xyz=[0, 7, 0]"),
+]
+
+
+@pytest.mark.parametrize(("line", "setting", "whole"), REST)
+def test_the_rest_of_a_list_is_zero_where_nothing_else_counts(
+    arm: Path, line: str, setting: str, whole: str
+) -> None:
+    arm.write_text(ARM + line + "\n")
+    before = [setting] if "offset" in setting else []
+    part = "moves.0.to.offset.xyz.1=7" if before else setting
+    one, other = (load_job(arm, [*before, last]) for last in (part, whole))
+    assert repr(one.job) == repr(other.job)
+
+
+def test_the_rest_of_gravity_is_that_in_force(arm: Path) -> None:
+    plain = load_job(arm).job.gravity
+    assert plain[2] != 0
+    assert load_job(arm, ["gravity.0=3"]).job.gravity == (3, *plain[1:])
+
+
+@pytest.mark.parametrize("key", ["base", "tool"])
+def test_the_rest_of_base_and_tool_is_that_of_the_robot(arm: Path, key: str) -> None:
+    """On a rail, too, whose arm may stand anywhere on it: what is set to what it is changes nothing."""
+    place = "base: {xyz: [70, 80, 90], rpy: [10, 20, 30]}, tool: {xyz: [1, 2, 3], rpy: [40, 50, 60]}"
+    robot = f"{{convention: standard, joints: [{{a: 100}}, {{a: 200}}], {place}}}"
+    tail = "moves: [{planner: hold, duration: 1}]\n"
+    for written, joints in (
+        (robot, 2),
+        (f"{{rail: {{axis: x}}, arm: {robot}, mount: {{xyz: [5, 0, 0]}}}}", 3),
+    ):
+        start = f"start: {{joints: {[0] * joints}}}\n"
+        arm.write_text(f"version: 1\nunits: {{angle: deg, length: mm}}\nrobot: {written}\n{start}{tail}")
+        plain = load_job(arm).robot
+        pose = plain.stand if key == "base" else plain.tool
+        same = load_job(arm, [f"{key}.xyz.1={float(pose[1, 3])!r} m"]).robot
+        np.testing.assert_allclose(same.base, plain.base, rtol=0, atol=1e-15)
+        np.testing.assert_allclose(same.tool, plain.tool, rtol=0, atol=1e-15)
 
 
 def test_settings_go_on_where_others_have_written(arm: Path) -> None:
