@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tool_jobs import LIMITS, TCP, plan, poses_of, times_of
+from tool_jobs import LIMITS, TCP, plan, planned, poses_of, times_of
 
 from trajcli.kinematics.jacobian import tcp_acceleration, tcp_twist
 
@@ -191,3 +191,54 @@ def test_a_turning_that_bends_keeps_the_angular_acceleration():
     made = plan("ur5e", START, move, limits=limits)
     acceleration = np.linalg.norm(rates(made, times_of(made, 6001))[1][:, 3:], axis=1)
     assert 2.0 < acceleration.max() <= 4.0 * (1 + 1e-5)
+
+
+def across(*targets: dict, overlap: float, **law):
+    segments = [{"line": target} for target in targets]
+    return {"planner": "path", "segments": segments, "corner": "overlap", "overlap": overlap, "law": law}
+
+
+def turned_about(*rpy):
+    return {"rpy": (np.array(DOWN) + rpy).tolist()}
+
+
+TOGETHER = {
+    "turning back": [
+        {"xyz": [0.4, 0.3, 0.05], **turned_about(0, 0, 0.5)},
+        {"xyz": [0.5, 0.3, 0.05], **turned_about(0, 0, -0.2)},
+    ],
+    "about two axes": [
+        {"xyz": [0.4, 0.2, 0.05], **turned_about(0, 0, 0.9)},
+        {"xyz": [0.5, 0.2, 0.05], **turned_about(0.6, 0, 0.9)},
+    ],
+    "straight on": [{"xyz": [0.4, 0.3, 0.05]}, {"xyz": [0.4, 0.5, 0.05]}],
+    "a short one": [{"xyz": [0.4, 0.15, 0.05]}, {"xyz": [0.4, 0.4, 0.05]}],
+}
+
+
+@pytest.mark.parametrize("shape", ["trapezoid", "quintic"])
+@pytest.mark.parametrize("overlap", [0.1, 0.25])
+@pytest.mark.parametrize("targets", TOGETHER.values(), ids=TOGETHER)
+def test_what_overlapping_segments_do_together_keeps_the_limits_of_the_tool(targets, overlap, shape):
+    """Both may cruise, speed up, or turn at once; plan() wants the verdict of all limits to pass."""
+    tcp = {"speed": 0.5, "acceleration": 3.0, "angular_speed": 2.0, "angular_acceleration": 12.0}
+    made = plan("ur5e", START, across(*targets, overlap=overlap, shape=shape), limits={"tcp": tcp})
+    velocity, acceleration = rates(made, times_of(made, 2001))
+    sizes = [velocity[:, :3], acceleration[:, :3], velocity[:, 3:], acceleration[:, 3:]]
+    used = np.array([np.linalg.norm(size, axis=1).max() for size in sizes]) / list(tcp.values())
+    assert 0.7 < used.max() <= 1 + 1e-5
+
+
+@pytest.mark.parametrize("law", [{"speed": 0.5, "acceleration": 5.0}, {"shape": "quintic", "duration": 1.0}])
+def test_a_law_that_overlapping_segments_are_told_is_not_slowed_down(law):
+    """Two that cruise at once are at twice the speed that is named: its finding is of that."""
+    made = planned(
+        "ur5e", START, across(*TOGETHER["straight on"], overlap=0.3, **law), limits={"tcp": {"speed": 0.5}}
+    )
+    assert made.trajectory.duration == pytest.approx(
+        law.get("duration", 2 * (0.2 / 0.5 + 0.1) - 0.3), rel=1e-9
+    )
+    speeds = np.linalg.norm(rates(made, times_of(made, 2001))[0][:, :3], axis=1)
+    (found,) = made.verdict.findings
+    assert found.kind == "tool_speed"
+    assert found.value == pytest.approx(speeds.max(), rel=1e-5)

@@ -37,7 +37,7 @@ _LOOKED_UP = 2000  # zones of one row of grids
 _SUMMED = 1 + 1e-12  # durations are added up in another order
 _REPEATED = np.array([[1.0], [2.5]])  # times a step that was made
 _AT_ONCE = 4  # moves of a chain that are searched together
-_AT_FIRST, _OVERLAP = 3, 1  # of the first grid, and how many of these again with those behind
+_AT_FIRST = 3  # of the first grid
 
 
 @frozen
@@ -139,11 +139,11 @@ class ChainSearch:
         return _rounded(self.nodes, self.parts, self.best)
 
 
-def _windows(parts: int, moves: int, overlap: int = 1) -> list[tuple[int, int]]:
+def _windows(parts: int, moves: int) -> list[tuple[int, int]]:
     """Return the first and the last node of each window of a chain: paths and zones in turns."""
     windows = [(0, min(parts, 2 * moves - 1))]
     while windows[-1][1] < parts:
-        low = windows[-1][1] + 1 - 2 * overlap
+        low = windows[-1][1] - 1
         windows.append((low, min(parts, low + 2 * moves - 1)))
     return windows
 
@@ -183,7 +183,7 @@ def _by_windows(grids: list[Array], nodes: Sequence[BorderNode], parts: Sequence
     What comes behind a window hardly counts for its first moves; the last ones are found again with the next.
     """
     states, durations = grids[0], list[float]()
-    for low, high in _windows(len(parts), _AT_FIRST, _OVERLAP):
+    for low, high in _windows(len(parts), _AT_FIRST):
         some = [states[low : low + 1], *grids[low + 1 : high + 1]]
         found = _fastest(_completed(some, nodes[low : high - 1], parts[low:high]), parts[low:high])
         states = np.concatenate([states[: low + 1], found.states[1:]])
@@ -214,7 +214,7 @@ def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart], known: float = 
     costs = _costs(pairs, known)
     looked_up: set[tuple[int, int, int]] = set()
     for _ in range(_LOOKED_UP):
-        _, chosen = _cheapest(costs)
+        chosen = _cheapest(costs)
         open_ended = False
         for k, (before, after, part) in enumerate(pairs):
             i, j = chosen[k], chosen[k + 1]
@@ -258,7 +258,7 @@ def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], known: float) -> lis
                 slower = zone.durations(i, j, order[turn : turn + 1])[:, 0]
                 costs[k][i, j] = np.maximum(costs[k][i, j], slower)
         if first:
-            known = min(known, _lasts(pairs, _cheapest(costs)[1]))
+            known = min(known, _lasts(pairs, _cheapest(costs)))
     return costs
 
 
@@ -290,8 +290,8 @@ def least_sums(costs: Sequence[Array]) -> tuple[list[Array], list[Array]]:
     return reached, left[::-1]
 
 
-def _cheapest(costs: Sequence[Array]) -> tuple[float, list[int]]:
-    """Return the least sum along a row of matrices, and the index at each node."""
+def _cheapest(costs: Sequence[Array]) -> list[int]:
+    """Return the index at each node of the least sum along a row of matrices."""
     total, back = np.zeros(1), []
     for cost in costs:
         reached = total[:, None] + cost
@@ -300,7 +300,7 @@ def _cheapest(costs: Sequence[Array]) -> tuple[float, list[int]]:
     chosen = [int(total.argmin())]
     for row in reversed(back):
         chosen.append(int(row[chosen[-1]]))
-    return float(total[chosen[0]]), chosen[::-1]
+    return chosen[::-1]
 
 
 def _rounded(nodes: Sequence[BorderNode], parts: Sequence[ChainPart], found: FoundStates) -> FoundStates:

@@ -108,11 +108,9 @@ class StoppingLaws:
 
     def _kept(self, chain: FlyByChain) -> list[int]:
         """Return the courses at all of whose borders the states are those of the motion that stops."""
+        borders = [self._borders(chain, k) for k in range(len(chain.courses))]
         last = len(_SHARES) - 1
-        levels = [
-            [self._level(border) for border in self._borders(chain, k)] for k in range(len(chain.courses))
-        ]
-        return [k for k, some in enumerate(levels) if some and min(some) == last]
+        return [k for k, some in enumerate(borders) if min(map(self._level, some), default=-1) == last]
 
     def _level(self, border: int) -> int:
         mixture = self._mixtures.get(border)

@@ -318,9 +318,9 @@ def _lowered(
             continue
         changed = True
         k, in_zone = divmod(number, 2)
-        factors = [finding.factor for finding in findings]
-        if None not in factors:
-            slower = 1 / (max(f for f in factors if f is not None) * (1 + _MORE))
+        factors = [finding.factor for finding in findings if finding.factor is not None]
+        if len(factors) == len(findings):
+            slower = 1 / (max(factors) * (1 + _MORE))
         elif in_zone and sizes[k] + 1 < len(_SIZES):
             sizes[k] += 1
             continue

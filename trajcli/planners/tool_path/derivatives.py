@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,7 +53,10 @@ def path_derivatives(path: ToolPath) -> PathDerivatives:
     first, second = _derivatives(path, s)
     turning, change = (largest_norm(rows[..., 3:]) for rows in (first, second))
     if path.orientation != "all":
-        turning, change = (_peak(path, s, order) * _SAFE for order in (0, 1))
+        turning, change = (
+            _SAFE
+            * largest(lambda s: np.linalg.norm(_derivatives(path, s)[..., 3:], axis=-1).max(axis=1).T, s)
+        ).tolist()
         change = change if change * path.length > _EVEN * turning else 0.0
     stretch = max(1.0, largest_norm(first[..., :3]))
     stretch = stretch if stretch > 1.0 + _EVEN else 1.0
@@ -60,19 +64,18 @@ def path_derivatives(path: ToolPath) -> PathDerivatives:
     return PathDerivatives(not path.poses.pure_rotation, curvature, turning, change, stretch)
 
 
-def _derivatives(path: ToolPath, s: Array) -> tuple[Array, Array]:
-    """Return X' and X'' at s (N,) from both sides, each (2, N, 6)."""
-    sides = [path.poses.evaluate(s, side) for side in ("left", "right")]
-    return np.stack([side[1] for side in sides]), np.stack([side[2] for side in sides])
+def _derivatives(path: ToolPath, s: Array) -> Array:
+    """Return X' and X'' at s (N,) from both sides, (2, 2, N, 6)."""
+    return np.stack([path.poses.evaluate(s, side)[1:] for side in ("left", "right")], axis=1)
 
 
-def _peak(path: ToolPath, s: Array, order: int) -> float:
-    """Return the largest norm of w' (order 0) or w'' (order 1), closer and closer around high samples."""
-    best = 0.0
+def largest(sizes: Callable[[Array], Array], s: Array) -> Array:
+    """Return the largest (k,) of sizes (N, k) at s (N,), closer and closer around high samples."""
+    best = np.zeros(1)
     for _ in range(_CLOSER):
-        sizes = np.linalg.norm(_derivatives(path, s)[order][..., 3:], axis=-1).max(axis=0)
-        best = max(best, float(sizes.max()))
-        highest = np.argsort(sizes)[-_HIGHEST:]
+        rows = sizes(s)
+        best = np.maximum(best, rows.max(axis=0))
+        highest = rows.argsort(axis=0)[-_HIGHEST:].ravel()
         low, high = s[np.maximum(highest - 1, 0)], s[np.minimum(highest + 1, s.size - 1)]
         s = np.unique(low + (high - low) * np.linspace(0.0, 1.0, _BETWEEN)[:, None])
     return best

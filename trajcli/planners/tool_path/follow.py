@@ -298,10 +298,8 @@ class FollowedPath:
         try:
             yield
         except LostError as error:
-            diagnosis, most = (
-                diagnosis_on_path(self.robot, self.path, self.follower),
-                most_pieces(self.path.breaks),
-            )
+            diagnosis = diagnosis_on_path(self.robot, self.path, self.follower)
+            most = most_pieces(self.path.breaks)
             raise diagnosis.unfit(float(error.s[0]), self.coarse.evaluate, most) from None
 
     def by_s(self, tolerance: Tolerance) -> PiecewisePolynomial:
@@ -339,10 +337,8 @@ def diagnosis_of_motion(
     robot: Robot, motion: ToolMotion, exact: Follower | None = None
 ) -> FollowingDiagnosis:
     """Return the diagnosis of an arm in a motion."""
-    free = 0 if exact is None else len(exact.held)
-    return FollowingDiagnosis(
-        robot, motion.reference_at, motion.law.end, motion.law, motion.pure_rotation, free
-    )
+    law, free = motion.law, 0 if exact is None else len(exact.held)
+    return FollowingDiagnosis(robot, motion.reference_at, law.end, law, motion.pure_rotation, free)
 
 
 def followed(robot: Robot, path: ToolPath, start: Array) -> FollowedPath:

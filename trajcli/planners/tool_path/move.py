@@ -159,9 +159,10 @@ class ToolPathMove(Planner):
     @property
     def why_not_flown_by(self) -> str | None:
         """Why no motion can fly by a corner of this move; None where it can."""
-        given = (name for name in ("duration", "minimum_duration") if getattr(self.law, name) is not None)
-        name = next(given, None)
-        return None if name is None else f"its law has a `{name}`"
+        for name in ("duration", "minimum_duration"):
+            if getattr(self.law, name) is not None:
+                return f"its law has a `{name}`"
+        return None
 
     def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
         """Return the joints along the path, from joint values (n,).

@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -26,13 +25,15 @@ from trajcli.geometry.paths.orientation import turn_vectors
 from trajcli.geometry.paths.position import PositionCurve
 from trajcli.geometry.rotation import exp
 from trajcli.kinematics.following.motion import ToolMotion
+from trajcli.kinematics.following.tolerance import probes
 from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 from trajcli.kinematics.robot import ToolLimits
-from trajcli.planners.tool_path.derivatives import PathDerivatives, largest_norm
+from trajcli.planners.tool_path.derivatives import PathDerivatives, largest, largest_norm
 from trajcli.planners.tool_path.law import LawSegment, lasting_at_least, law_bounds
 from trajcli.planners.tool_path.move import ToolPathMove, ToolTarget, orientation_along
 
 _ONE_TIME = 1e-9  # of the duration: times this close to each other are one
+_ROUNDS = 30  # in which segments that are over a limit together are slowed down
 
 
 @frozen
@@ -66,8 +67,7 @@ class OverlappingSegments:
         for k in np.flatnonzero(begun < done).tolist():
             rows = slice(begun[k], done[k])
             self._add(k, ordered[rows], side, poses[rows], first[rows], second[rows], aims[rows])
-        back = np.empty_like(order)
-        back[order] = np.arange(order.size)
+        back = np.argsort(order)
         target = self.last
         if target.orientation not in ("yaw", "pitch"):
             aims = aims[:, :0]
@@ -138,48 +138,65 @@ def overlapping_motion(
     if move.orientation == "fixed":
         orientation_along("fixed", before[:3, :3], targets, curves[0], None)
     vectors = turn_vectors(rotations[:-1], rotations[1:])
-    segments = _law_segments(curves, vectors, move, overlap, limits)
-    starts = np.concatenate([[0.0], np.cumsum([segment.law.duration - overlap for segment in segments])])
-    _check(segments, overlap)
-    end = float(starts[-1] + overlap)
-    pairs = list(zip(segments, starts[:-1], strict=True))
-    laws = [
-        PiecewisePolynomial(segment.law.breaks + start, segment.law.coefficients) for segment, start in pairs
+    bounds = np.array([*vars(limits).values()]).reshape(2, 3)
+    turns = [
+        after.evaluate(np.zeros(1))[1] - until.evaluate(np.array([until.length]), "left")[1]
+        for until, after in pairwise(curves)
     ]
-    merged = merge_breaks([_in_turn(laws[first::2], end) for first in (0, 1)])
-    whole = PiecewisePolynomial(merged.breaks, merged.coefficients.sum(axis=2, keepdims=True))
-    breaks = _distinct(np.concatenate([segment.breaks + start for segment, start in pairs]), end)
-    turns = np.array([target.turn for target in targets])
-    tool = OverlappingSegments(before, tuple(curves), vectors, tuple(laws), targets[-1], turns)
-    return ToolMotion(None, whole, tool.reference_at, breaks, move.tolerance.tolerance)
+    slowing = max(1.0, largest_norm(np.array(turns)))  # one, and the next speeding up: that adds up
+    lower = bounds / [[1.0, slowing, 2.0], [1.0, 1.0, 2.0]]
+    for number in range(_ROUNDS if move.law.duration is None else 1):
+        limits = ToolLimits(*lower.ravel().tolist())
+        motion = _motion(before, curves, vectors, targets, move, overlap, limits)
+        times = np.sort(np.append(motion.breaks, probes(motion.breaks)))
+        over = largest(partial(_sizes, motion), times).reshape(2, 2) / bounds[:, :2]
+        if over.max() <= 1 + 1e-9:
+            break
+        over[:, 1] = over.max(axis=1)  # with longer ramps less of the full speeds adds up
+        over[:, 0] *= number >= _ROUNDS / 2
+        lower[:, :2] /= np.maximum(1.001 * over, 1.0)  # by a bit more, so that few rounds do
+    return motion
 
 
-def _law_segments(
-    curves: Sequence[PositionCurve], vectors: Array, move: ToolPathMove, overlap: float, limits: ToolLimits
-) -> list[LawSegment]:
-    """Return the law of each segment, of which neighbours together keep the limits."""
+def _sizes(motion: ToolMotion, times: Array) -> Array:
+    """Return speed and acceleration, and angular ones, at times (N,): the larger of both sides, (N, 4)."""
+    sides = [motion.reference(times, side) for side in ("left", "right")]
+    rates = np.array([[each.first, each.second] for each in sides]).reshape(2, 2, -1, 2, 3)
+    return np.asarray(np.linalg.norm(rates, axis=-1).max(axis=0).transpose(1, 2, 0).reshape(-1, 4))
+
+
+def _motion(
+    before: Array,
+    curves: Sequence[PositionCurve],
+    vectors: Array,
+    targets: Sequence[ToolTarget],
+    move: ToolPathMove,
+    overlap: float,
+    limits: ToolLimits,
+) -> ToolMotion:
+    """Return the motion of segments of which each keeps limits."""
     spec, total = move.law, math.fsum(curve.length for curve in curves)
-    shared = (len(curves) - 1) * overlap
-    lower = replace(  # two at once add up
-        limits, acceleration=limits.acceleration / _largest_turn(curves), jerk=limits.jerk / 2
-    )
-    segments = []
+    shared, segments = (len(curves) - 1) * overlap, []
     for curve, vector in zip(curves, vectors, strict=True):
         curvature = largest_norm(curve.evaluate(np.zeros(1))[2])  # of a line or an arc: the same everywhere
         derivatives = PathDerivatives(True, curvature, float(np.linalg.norm(vector)) / curve.length, 0.0)
-        bounds, _ = law_bounds(spec, lower, derivatives, "path")
+        bounds, _ = law_bounds(spec, limits, derivatives, "path")
         share = None if spec.duration is None else (spec.duration + shared) * curve.length / total
         segments.append(spec.time_law.segment(spec, curve.length, bounds, share))
-    return lasting_at_least(spec.minimum_duration and spec.minimum_duration + shared, segments)
-
-
-def _largest_turn(curves: Sequence[PositionCurve]) -> float:
-    """Return how many accelerations along a segment add up to where one slows down and the next speeds up."""
-    turns = [
-        after.evaluate(np.zeros(1))[1][0] - before.evaluate(np.array([before.length]), "left")[1][0]
-        for before, after in pairwise(curves)
-    ]
-    return max(1.0, *(float(np.linalg.norm(turn)) for turn in turns))
+    segments = lasting_at_least(spec.minimum_duration and spec.minimum_duration + shared, segments)
+    _check(segments, overlap)
+    starts = np.cumsum([0.0, *(segment.law.duration - overlap for segment in segments)])
+    end = float(starts[-1] + overlap)
+    pairs = list(zip(segments, starts[:-1], strict=True))
+    laws = [PiecewisePolynomial(each.law.breaks + start, each.law.coefficients) for each, start in pairs]
+    merged = merge_breaks([_in_turn(laws[first::2], end) for first in (0, 1)])
+    whole = PiecewisePolynomial(merged.breaks, merged.coefficients.sum(axis=2, keepdims=True))
+    times = np.sort(np.concatenate([each.breaks + start for each, start in pairs]).clip(0.0, end))
+    breaks = times[np.append(True, np.diff(times) > _ONE_TIME * end)]
+    breaks[-1] = end
+    turns = np.array([target.turn for target in targets])
+    tool = OverlappingSegments(before, tuple(curves), vectors, tuple(laws), targets[-1], turns)
+    return ToolMotion(None, whole, tool.reference_at, breaks, move.tolerance.tolerance)
 
 
 def _check(segments: Sequence[LawSegment], overlap: float) -> None:
@@ -189,37 +206,21 @@ def _check(segments: Sequence[LawSegment], overlap: float) -> None:
         if segment.law.duration < sides * overlap:
             message = f"segment {index} lasts {{lasts}}, too short to overlap its neighbours by {{overlap}}"
             amounts = {"lasts": Amount(segment.law.duration), "overlap": Amount(overlap)}
-            hint = "shorten `overlap`, or go slower"
-            raise PlanningError(Problem(message, hint, amounts=amounts))
+            raise PlanningError(Problem(message, "shorten `overlap`, or go slower", amounts=amounts))
 
 
 def _in_turn(laws: Sequence[PiecewisePolynomial], end: float) -> PiecewisePolynomial:
     """Return what laws that do not overlap add up to over [0, end], at rest between them."""
     breaks, coefficients, s = np.zeros(1), list[Array](), np.zeros(1)
-    for law in laws:
-        if law.start - breaks[-1] > _ONE_TIME * end:
-            coefficients.append(_at_rest(s, law))
-            breaks = np.append(breaks, law.start)
-        coefficients.append(law.coefficients.copy())
-        coefficients[-1][-1] += s
-        breaks = np.append(breaks, law.breaks[1:])
-        s = s + law.piece_ends()[1][-1]
-    if end - breaks[-1] > _ONE_TIME * end:
-        coefficients.append(_at_rest(s, laws[-1]))
-        breaks = np.append(breaks, end)
+    for start, law in [*((law.start, law) for law in laws), (end, None)]:
+        if start - breaks[-1] > _ONE_TIME * end:
+            coefficients.append(np.zeros_like(laws[0].coefficients[:, :1]))
+            coefficients[-1][-1] = s
+            breaks = np.append(breaks, start)
+        if law is not None:
+            coefficients.append(law.coefficients.copy())
+            coefficients[-1][-1] += s
+            breaks = np.append(breaks, law.breaks[1:])
+            s = s + law.piece_ends()[1][-1]
     breaks[-1] = end
     return PiecewisePolynomial(breaks, np.concatenate(coefficients, axis=1))
-
-
-def _at_rest(s: Array, law: PiecewisePolynomial) -> Array:
-    """Return the coefficients (degree + 1, 1, 1) of one piece at rest at s (1,), of the degree of a law."""
-    return np.concatenate([np.zeros((law.degree, 1, 1)), s.reshape(1, 1, 1)])
-
-
-def _distinct(times: Array, end: float) -> Array:
-    """Return the distinct times within [0, end], those that rounding keeps apart made one."""
-    ordered = np.sort(np.clip(times, 0.0, end))
-    keep = np.append(True, np.diff(ordered) > _ONE_TIME * end)
-    distinct = ordered[keep]
-    distinct[-1] = end
-    return np.asarray(distinct)

@@ -114,11 +114,8 @@ class PathMove(WovenMove):
     def _flaws_of_radii(self) -> Iterator[Flaw]:
         if self.corner == "round":
             if isinstance(self.segments, RecordedPoses) and self.radius is None and self._count > 1:
-                yield (
-                    ("segments",),
-                    "the corners between recorded poses have no radius",
-                    "give the move a `radius`",
-                )
+                text = "the corners between recorded poses have no radius"
+                yield ("segments",), text, "give the move a `radius`"
             for k, segment in enumerate(self._listed[:-1]):
                 if segment.radius is None and self.radius is None:
                     hint = "give the move, or each segment, a `radius`"
@@ -162,7 +159,6 @@ class PathMove(WovenMove):
         self._refuse_inner_pins()
         segments, left_out = segments_from(self.segments, before)
         curves, targets, kept = curves_of(before, segments, robot)
-        overlap = self.overlap is not None and len(curves) > 1
         radius = self.radius or 0.0 if self.corner == "round" else 0.0
         radii = corner_radii(segments, kept, radius)
         radii, turned_back = turning_back(curves, radii, kept)
@@ -177,7 +173,7 @@ class PathMove(WovenMove):
         turns = tuple(target.turn for target in targets)
         speeds = stepping_speeds(segments, kept, chain.borders, self.law, robot.limits.tcp)
         path = ToolPath(poses, last.position, fixed, last.tool_axis, turns, chain.progress, speeds)
-        to = segments[-1].line or (segments[-1].arc and segments[-1].arc.to)
+        to = _end_of(segments[-1])
         merged = merged_events(len(segments), kept)
         events = (*left_out, *merged, *turned_back, *center_events(curves), *_radius_events(chain))
         ends = [*(corner.s for corner in chain.corners), path.length]
@@ -187,16 +183,16 @@ class PathMove(WovenMove):
             to.configuration if to else None,
             events,
             targets=tuple(
-                (("segments", k, "line") if segment.arc is None else ("segments", k, "arc", "to"), s)
-                for k, segment, s in zip(kept, [segments[k] for k in kept], ends, strict=True)
-                if segment.arc is None or segment.arc.to is not None
+                (("segments", k, *(("line",) if segments[k].arc is None else ("arc", "to"))), s)
+                for k, s in zip(kept, ends, strict=True)
+                if _end_of(segments[k]) is not None
             ),
         )
-        if not overlap:
+        if self.overlap is None or len(curves) == 1:
             return self.woven(planned)
         from trajcli.planners.tool_path.overlap import overlapping_motion
 
-        motion = overlapping_motion(before, curves, targets, self, self.overlap or 0.0, robot.limits.tcp)
+        motion = overlapping_motion(before, curves, targets, self, self.overlap, robot.limits.tcp)
         return replace(planned, overlap=replace(motion, path=path, overlaps=True))
 
 

@@ -138,8 +138,7 @@ def _events(solved: TimeOptimalMotion, robot: Robot, remaining: float, *, fastes
     events = []
     if isinstance(solved, JerkLimitedMotion):
         events.append(solved_by_convex_steps(solved))
-        if solved.stops.size:
-            count = solved.stops.size
+        if count := solved.stops.size:
             text = f"stops {count} time{'s' * (count != 1)} where the path bends: limits of jerk ask for it"
             events.append(Event("stops", text))
     elif solved.refinements:
@@ -157,8 +156,10 @@ def _remaining_stretch(
     robot: Robot, solved: TimeOptimalMotion, limits: ToolLimits, speeds: SpeedLimits | None
 ) -> float:
     """Return how many times longer the motion must last to keep the tool's limits, as checks judge them."""
-    whole = _stretch_of_whole(robot, solved.trajectory, limits)
-    return whole if speeds is None else max(whole, _stretch_by_segment(robot, solved, speeds))
+    worst = _stretch_of_whole(robot, solved.trajectory, limits)
+    if speeds is not None:
+        worst = max(worst, _stretch_by_segment(robot, solved, speeds))
+    return worst if worst > 1 + TOOL_RELATIVE else 1.0
 
 
 def _stretch_of_whole(robot: Robot, trajectory: PiecewisePolynomial, limits: ToolLimits) -> float:
@@ -170,20 +171,18 @@ def _stretch_of_whole(robot: Robot, trajectory: PiecewisePolynomial, limits: Too
     peaks = tool_peaks(limited, trajectory.breaks, trajectory.coefficients)
     kinds = [kind for kind in TOOL_KINDS if kind.key in peaks]
     factors = [(peaks[k.key].upper_bound / getattr(limits, k.key)) ** (1 / (k.order or 1)) for k in kinds]
-    worst = max(factors, default=1.0)
-    return float(worst) if worst > 1 + TOOL_RELATIVE else 1.0
+    return max(factors, default=1.0)
 
 
 def _stretch_by_segment(robot: Robot, solved: TimeOptimalMotion, speeds: SpeedLimits) -> float:
     """Return that by limits of speed that step along the path."""
     from trajcli.limits.tool_bound import speed_runs
 
-    worst = max(
+    return max(
         peak.upper_bound / limit
         for run in speed_runs(robot, speeds, solved.law, solved.trajectory)
         for peak, limit in zip(run.peaks, run.limits, strict=True)
     )
-    return worst if worst > 1 + TOOL_RELATIVE else 1.0
 
 
 def limits_of_law(spec: LawSpec, limits: ToolLimits, speeds: SpeedLimits | None = None) -> ToolLimits:

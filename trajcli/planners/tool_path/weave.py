@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from trajcli.errors import Amount, InputError, Problem
 from trajcli.geometry.paths.pose import PoseCurve
-from trajcli.language.numbers import Flaw, Model, Number, refuse
+from trajcli.language.numbers import Model, Number, refuse
 from trajcli.language.targets import Direction, Row
 from trajcli.planners.planner import Event
 from trajcli.planners.tool_path.law import LawSpec
@@ -79,15 +79,11 @@ class WovenMove(ToolPathMove):
 
     @model_validator(mode="after")
     def _weave_fits(self) -> WovenMove:
-        flaws = list(self._flaws_of_weave())
-        if flaws:
-            raise refuse(flaws)
-        return self
-
-    def _flaws_of_weave(self) -> Iterator[Flaw]:
-        if self.weave is not None and self.weave.frequency is not None and self.law.speed is None:
+        if self.weave and self.weave.frequency and self.law.speed is None:
             text = "a frequency makes a length with the `speed` of the law, which has none"
-            yield ("weave", "frequency"), text, "say law: {speed: ...}, or give the `length` of a cycle"
+            hint = "say law: {speed: ...}, or give the `length` of a cycle"
+            raise refuse([(("weave", "frequency"), text, hint)])
+        return self
 
     def woven(self, planned: PlannedPath) -> PlannedPath:
         """Return a path with its weave, if it has one.
