@@ -75,10 +75,26 @@ def test_end_that_can_only_be_reached_from_outside():
     assert problem.value == pytest.approx(0.9 + 1.5**2 / (2 * 5.0), rel=1e-12)
     assert problem.limit == 1.0
     assert "j1" in problem.text()
+    start = state([0.0, 0.0], 0.0, [-0.5, 0.0])
+    assert refusal(state([1.0, 2.0], [0.9, 0.0], [-1.5, 0.0]), start=start)[0].value == problem.value
     just = 0.99 * np.sqrt(2 * 5.0 * 0.1)
     assert (
         move_to(state([1.0, 2.0], [0.9, 0.0], [-just, 0.0])).plan(state([0.0, 0.0]), ROBOT).curve.duration > 0
     )
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_velocity_that_can_only_be_reached_from_outside(sign):
+    """Without a target, too, the acceleration passes zero: by then the joint moved at 0.9 + 1.5^2 / 10."""
+    end = state([0.0, 0.0], [sign * 0.9, 0.0], [-sign * 1.5, 0.0])
+    for begun in (0.0, sign * 0.5):
+        (problem,) = refusal(end, start=state([0.0, 0.0], 0.0, [begun, 0.0]), joints=False)
+        assert problem.value == pytest.approx(sign * (0.9 + 1.5**2 / (2 * 5.0)), rel=1e-12)
+        assert problem.limit == sign * 1.0
+    start = state([0.0, 0.0], [sign * 0.92, 0.0], [-sign * 1.45, 0.0])  # it slows down already
+    curve = move_to(end, joints=False).plan(start, ROBOT).curve
+    np.testing.assert_allclose(curve.evaluate(curve.end, 1), end.velocity, rtol=0, atol=1e-12)
+    assert np.abs(curve.evaluate(np.linspace(0.0, curve.end, 99), 1)[:, 0]).max() <= 1.0
 
 
 def test_end_velocity_at_its_limit_is_no_rounding_matter():

@@ -212,6 +212,19 @@ def test_straight_keeps_to_the_polyline():
     assert "j1" in problem.text() or "j2" in problem.text()
 
 
+@pytest.mark.parametrize("kind", ["velocity", "acceleration"])
+def test_a_joint_that_stands_on_a_line_says_nothing_about_its_law(kind):
+    """Of such a joint a velocity of zero was taken for a stop of all joints."""
+    corners = [[0.0, 0.0, 0.0], [0.4, 0.0, -0.2], [0.8, 0.0, -0.4], [0.8, 0.5, 0.0]]
+    case = {**CASE, "waypoints": corners}
+    free = plan_of(case, straight=True).trajectory.duration
+    plan = plan_of(case, straight=True, points={1: {kind: {"j2": 0.0}}})
+    assert plan.trajectory.duration == pytest.approx(free, rel=1e-9)
+    slow = plan_of(case, straight=True, points={1: {"velocity": {"j1": 0.3, "j2": 0.0}}})
+    np.testing.assert_allclose(at_points(slow, 1)[1], [0.3, 0.0, -0.15], rtol=0, atol=1e-9)
+    assert slow.trajectory.duration > free
+
+
 @pytest.mark.parametrize(
     ("limits", "step", "length"), [((0.05, 1.0, 50.0), 2e-9, 30.0), ((0.01, 1.0, 1000.0), 1e-6, 5.0)]
 )

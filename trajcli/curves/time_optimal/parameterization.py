@@ -53,19 +53,7 @@ _FEW_NEW = 0.1  # of the intervals: for fewer new ones the whole solution is not
 _ROUNDS = 8  # of refinement
 _TRIES = 4  # of halving the grid before a speed at an end is called too high
 _TIGHTENINGS, _MOST_TIGHTENINGS = 8, 40  # where little is stretched away, and where much is, or must not be
-_LOWERED = (
-    1.1,
-    1.2,
-    1.5,
-    2.0,
-    2.0,
-    2.0,
-    2.0,
-    2.0,
-    4.0,
-    8.0,
-    16.0,
-)  # times the excess that limits are lowered by, round by round
+_LOWERED = (1.1, 1.2, 1.5, *5 * (2.0,), 4.0, 8.0, 16.0)  # times the excess that limits are lowered, by round
 _EXTRA = 1e-9  # of a limit: taken off beyond that
 _MOST_LOWERED = 0.2  # of a limit: no more of its excess is taken off it at a time
 _STUBBORN = 1e-5  # of a limit: where it is passed by more in the end, sdd shall not change

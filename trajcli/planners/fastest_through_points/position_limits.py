@@ -51,8 +51,7 @@ def _near(problem: WaypointProblem, times: Array) -> NDArray[np.bool_]:
     low, high = problem.position.T
     over = np.maximum(points[:-1], points[1:]) + beyond > high
     under = np.minimum(points[:-1], points[1:]) - beyond < low
-    near: NDArray[np.bool_] = over | under
-    return near
+    return np.asarray(over | under)
 
 
 def leaving(problem: WaypointProblem, times: Array, states: Array) -> NDArray[np.bool_]:
@@ -100,7 +99,7 @@ def _extremes(
     for time, jerk in phases:
         square = a * a - 2 * jerk * v
         if square >= 0:
-            root = math.copysign(math.sqrt(square), a if a else -v)
+            root = math.copysign(math.sqrt(square), a)
             zeros = [-2 * v / (a + root) if a + root else -1.0, -(a + root) / jerk if jerk else -1.0]
             reached += [p + z * (v + z * (a / 2 + z * jerk / 6)) for z in zeros if 0 < z < time]
         p += time * (v + time * (a / 2 + time * jerk / 6))

@@ -101,8 +101,7 @@ def search(
 def _scaled(problem: WaypointProblem, states: Array) -> Array:
     """Return states (K + 1, n, 2) in the units of the problem."""
     time, lengths = problem.units
-    scaled: Array = states / np.stack([lengths / time, lengths / time**2], axis=1)
-    return scaled
+    return np.asarray(states / np.stack([lengths / time, lengths / time**2], axis=1))
 
 
 def _found(problem: WaypointProblem, starts: Sequence[Start], lower: float, known: Array | None) -> Found:

@@ -94,16 +94,15 @@ def _law(problem: WaypointProblem, first: int, last: int, names: list[str]) -> t
     """Return the problem of the law of a stretch, and the displacement along it."""
     points = problem.points[first : last + 1]
     line = points[-1] - points[0]
-    along, _ = _on_line(points)
+    along, moving = _on_line(points)[0], line != 0
     states, fixed = np.zeros((len(points), 1, 2)), np.zeros((len(points), 1, 2), dtype=bool)
     fixed[[0, -1]] = True
     for k, order in np.argwhere(problem.fixed[first : last + 1].any(axis=1)).tolist():
-        fixed[k, 0, order] = True
+        fixed[k, 0, order] |= problem.fixed[first + k, moving, order].any()
         rate = _rate(problem, first + k, order, line, names)
-        if rate and first + k in (first, last) and 0 < first + k < problem.segments:
+        if rate and first + k == last < problem.segments:
             raise _moves_at_turn(problem.states[first + k, :, order], first + k, order + 1, names)
         states[k, 0, order] = rate
-    moving = line != 0
     bounds = [bounds_along(line, limit)[None] for limit in (problem.velocity, problem.acceleration)]
     jerk, loosest = (
         (each[moving] / np.abs(line[moving])).min(keepdims=True)

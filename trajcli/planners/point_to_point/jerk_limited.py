@@ -378,7 +378,8 @@ def _end_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
             }
             hint = f"lower the end {QUANTITIES[order]}, or raise the limit"
             return [Problem(message, hint, joint=boundary.name, value=value, limit=limit, amounts=amounts)]
-    if boundary.control == "velocity" or not boundary.final[2] or boundary.done:
+    begun = boundary.control == "velocity" and boundary.initial[2] * boundary.final[2] > 0
+    if begun or not boundary.final[2] or boundary.done:
         return []
     return _approach_problems(boundary, joint)
 
@@ -386,11 +387,10 @@ def _end_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
 def _approach_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
     """The end acceleration a was built up from zero: before, the velocity was a |a| / (2 jerk) less."""
     velocity, acceleration = boundary.final[1:]
-    before = velocity - acceleration * abs(acceleration) / (2 * float(np.abs(boundary.bounds[2]).min()))
-    low, high = boundary.bounds[0].tolist()
-    if low * (1 + _ROUNDING) <= before <= high * (1 + _ROUNDING):
+    before = _beyond(boundary.final, -1, boundary.bounds)
+    if not before:
         return []
-    limit = low if before < 0 else high
+    limit = float(boundary.bounds[0, int(before > 0)])
     message = (
         "{joint} would end with velocity {velocity} and acceleration {acceleration}: within its "
         "jerk limit it must have moved at {before} just before, beyond its velocity limit {limit}"
