@@ -10,7 +10,7 @@ import ruckig
 from numpy.typing import NDArray
 from tiers import few
 
-from trajcli.planners.fastest_through_points.position_limits import leaving, room, with_limits_near
+from trajcli.planners.fastest_through_points.position_limits import distances, leaving, with_limits_near
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.state_times import durations
 
@@ -53,7 +53,7 @@ def sampled(problem: WaypointProblem, joint: int, ends: Values, duration: float,
 @pytest.mark.parametrize("seed", few(range(20), 4))
 def test_distances_and_their_slopes(seed: int) -> None:
     problem, times, states = drawn(seed)
-    found, compared = room(problem, times, states), 0
+    found, compared = distances(problem, times, states), 0
     sizes = 1e-3 * np.concatenate([problem.scales, problem.scales], axis=1)
     for k, j in np.ndindex(*times.shape, 2):
         ends, pair = problem.points[k : k + 2, j], np.concatenate([states[k, j], states[k + 1, j]])
@@ -89,7 +89,7 @@ def test_a_joint_leaves_the_limits_that_its_motion_passes(seed: int) -> None:
 def test_where_there_is_no_motion_nothing_is_said() -> None:
     problem, times, states = drawn(0)
     states[1, 0, 0] = 9.0
-    found = room(problem, times, states)
+    found = distances(problem, times, states)
     assert np.isposinf(found.distance[0, 0]).all()
     assert not found.slopes[0, 0].any()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajcli.planners.fastest_through_points.position_limits import room
+from trajcli.planners.fastest_through_points.position_limits import distances
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.state_times import durations, state_times
 
@@ -42,7 +42,7 @@ def test_positions_and_durations_change_as_a_little_inside(edge):
     for share in (EDGE, INSIDE):
         states = states_of(share, edge)
         times = 1.2 * durations(problem, states)
-        found.append((room(problem, times, states).slopes, state_times(problem, states).slopes))
+        found.append((distances(problem, times, states).slopes, state_times(problem, states).slopes))
     for at_edge, inside in zip(*found, strict=True):
         assert np.abs(inside).max() > 0.1
         assert at_edge == pytest.approx(inside, rel=0.02, abs=0.01)

@@ -66,12 +66,12 @@ def leaving(problem: WaypointProblem, times: Array, states: Array) -> NDArray[np
     one = _OneJoint(problem)
     for k, j in np.argwhere(_near(problem, times)).tolist():
         low, high = one.extremes(k, j, times[k], np.concatenate([states[k, j], states[k + 1, j]]))
-        least, most = problem.position[j].tolist()
-        found[k, j] = low < least - _TOUCH or high > most + _TOUCH
+        lower, upper = problem.position[j].tolist()
+        found[k, j] = low < lower - _TOUCH or high > upper + _TOUCH
     return found
 
 
-def room(problem: WaypointProblem, times: Array, states: Array) -> Room:
+def distances(problem: WaypointProblem, times: Array, states: Array) -> Room:
     """Return how near positions come to their limits, for times (K,) and states (K + 1, n, 2)."""
     segments, joints = problem.steps.shape
     distance, slopes = np.full((segments, joints, 2), np.inf), np.zeros((segments, joints, 2, 4))
@@ -85,8 +85,8 @@ def room(problem: WaypointProblem, times: Array, states: Array) -> Room:
         distance[k, j] = (here - problem.position[j]) * [1, -1]
         for c, step in enumerate(np.diag(sizes[j])):
             sides = [sign * (one.extremes(k, j, times[k], pair + sign * step) - here) for sign in (1, -1)]
-            known = [side for side in sides if np.isfinite(side).all()]  # beyond limits there is no motion
-            slopes[k, j, :, c] = np.mean(known, axis=0) / _DIFFERENCE if known else 0.0
+            finite = [side for side in sides if np.isfinite(side).all()]  # beyond limits there is no motion
+            slopes[k, j, :, c] = np.mean(finite, axis=0) / _DIFFERENCE if finite else 0.0
     return Room(distance, slopes)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.linear_programme import SegmentProgramme, solved
-from trajcli.planners.fastest_through_points.position_limits import leaving, room
+from trajcli.planners.fastest_through_points.position_limits import distances, leaving
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.state_times import (
     StateTimes,
@@ -128,7 +128,7 @@ def _step(
     low[:, :, _TIME] = np.maximum((known.alone - usual[:, None]) / unit, -_FAR)
     _fill_state_rows(problem, motion, region, rows, (low, high))
     if problem.walled:
-        wall = room(problem, motion.times, motion.states)
+        wall = distances(problem, motion.times, motion.states)
         size = (problem.scales[:, 0] * unit)[:, None]
         rows[:, :, _WALLS:, :4] = wall.slopes / size[..., None] * both[:, :, None]
         rows[:, :, _WALLS + 1] *= -1
