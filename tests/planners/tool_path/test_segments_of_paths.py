@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from tool_jobs import DOWN, job_text, refusal
 
 from trajcli.errors import TrajcliError
@@ -268,3 +269,20 @@ def test_a_law_of_one_segment_is_refused_where_the_law_is_one() -> None:
         "ur5e", HERE, {"planner": "path", "segments": [line(POINTS[1], law={"angular_speed": 1})]}
     )
     assert "a trapezoid law is one for the whole path" in str(error)
+
+
+def test_where_segments_overlap_a_yaw_is_that_of_the_poses_and_its_rate_that_of_its_change() -> None:
+    """The heading of the tool's x axis, by arctan2, over three changes of it."""
+    places = zip(POINTS[1:], (0.5, -0.2, 0.7), strict=True)
+    segments = [{"line": {"xyz": p.tolist(), "yaw": yaw, "tool_axis": "x"}} for p, yaw in places]
+    law = {"speed": 0.1, "acceleration": 1.0, "angular_speed": 1.0, "angular_acceleration": 9.0}
+    turned = BEFORE.copy()
+    turned[:3, :3] = Rotation.from_euler("z", 0.3).as_matrix() @ BEFORE[:3, :3]
+    motion = path_of(*segments, before=turned, corner="overlap", overlap=0.1, law=law).overlap
+    assert motion is not None
+    times = np.linspace(0.0, motion.law.end, 60)
+    found = motion.reference(times)
+    np.testing.assert_allclose(
+        found.aims[:, 0], np.arctan2(found.poses[:, 1, 0], found.poses[:, 0, 0]), atol=1e-12
+    )
+    np.testing.assert_allclose(found.aims[:, 1], found.first[:, 5], atol=1e-12)

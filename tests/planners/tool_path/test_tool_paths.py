@@ -242,3 +242,10 @@ def test_a_law_that_overlapping_segments_are_told_is_not_slowed_down(law):
     (found,) = made.verdict.findings
     assert found.kind == "tool_speed"
     assert found.value == pytest.approx(speeds.max(), rel=1e-5)
+
+
+def test_an_overlap_longer_than_ramps_lengthens_them_and_leaves_the_speed():
+    """Over ramps as long as the overlap the speeds of both add up to the full one: 2 L / v + overlap."""
+    tcp = {"speed": 0.5, "acceleration": 5.0}
+    made = plan("ur5e", START, across(*TOGETHER["straight on"], overlap=0.15), limits={"tcp": tcp})
+    assert made.trajectory.duration == pytest.approx(2 * 0.2 / 0.5 + 0.15, rel=2e-3)

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from independent_motion import poses, series_of
 from tiers import few
-from tool_jobs import DOWN, plan, refusal
+from tool_jobs import DOWN, job_text, plan, refusal
 
 from trajcli.cli.tool_text import tool_lines
+from trajcli.errors import TrajcliError
 from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import FixedOrientation
 from trajcli.geometry.paths.position import Line
+from trajcli.job.read import job_from_text
 from trajcli.kinematics.following.weave import Weave
 from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.path_bound import path_bounds
@@ -286,3 +288,54 @@ def test_more_cycles_than_fit_into_memory_are_refused_with_the_shortest_length()
         text = str(refusal("ur5e", HERE, {**move, "weave": {"amplitude": A, **weave}}, limits=WIDE))
         assert "at most 100000 cycles weave" in text
         assert "2e-06 m or longer, not 1e-" in text
+
+
+BEFORE = np.array([[1.0, 0, 0, 0.4], [0, -1, 0, -0.1], [0, 0, -1, 0.3], [0, 0, 0, 1]])
+
+
+def move_of(*seams, **weave):
+    """Return the move, and its path, along lines of these lengths, each square to the one before, with stops."""
+    directions = np.array([[0, 1.0, 0], [1.0, 0, 0]] * len(seams))[: len(seams)]
+    places = np.cumsum(directions * np.array(seams)[:, None], axis=0) + HERE["xyz"]
+    segments = [{"line": {"xyz": place}} for place in places.tolist()]
+    move = {"planner": "path", "segments": segments, "corner": "stop", "law": LAW}
+    loaded = job_from_text(job_text("ur5e", HERE, {**move, **({"weave": weave} if weave else {})}))
+    return loaded.job.moves[0], loaded.job.moves[0].path_from(BEFORE, loaded.robot)
+
+
+@pytest.mark.parametrize("wanted", [0.2 / 1.7, 0.2 / 18.4, 0.2 / 2.5, 0.2 / 0.7, 1.0])
+@pytest.mark.parametrize("shape", ["sine", "trapezoid"])
+def test_between_stops_there_are_the_halves_that_are_asked_for_or_the_nearest_number_of_cycles(wanted, shape):
+    """At least one; the remark is on the cycle that is furthest from what is asked for, longer or shorter."""
+    seams = np.array([0.2, 0.13])
+    weave = move_of(*seams, amplitude=A, length=wanted, shape=shape)[1].path.poses.position
+    exact = [np.arange(1, 99) / 2, np.arange(1, 99)]
+    for seam, cycles in zip(seams, weave.cycles, strict=True):
+        found = [numbers[np.abs(numbers - seam / wanted).argmin()] for numbers in exact]
+        assert cycles == pytest.approx(found[0] if abs(found[0] * wanted - seam) < 1e-9 else found[1])
+    assert weave.shape == shape
+
+
+@pytest.mark.parametrize(
+    ("seams", "worst"), [([0.2, 0.13], 0.13), ([0.17, 0.2], 0.17), ([0.0, 0.24, 0.2], 0.24)]
+)
+def test_the_remark_on_cycles_is_of_those_furthest_from_what_is_asked_for(seams, worst):
+    """0.1 m fits 0.2 m; 0.13 m takes one of 0.13 m, 0.17 m two of 0.085 m, 0.24 m two of 0.12 m."""
+    planned = move_of(*seams, amplitude=A, length=0.1)[1]
+    assert [event.kind for event in planned.events] == [*(["merged"] if 0.0 in seams else []), "weave_fitted"]
+    used = planned.events[-1].amounts["used"].value
+    assert used == pytest.approx(worst / round(worst / 0.1))
+
+
+def test_what_weaves_is_not_flown_by():
+    assert move_of(0.2, amplitude=A, length=0.1)[0].why_not_flown_by == "it weaves"
+    assert move_of(0.2)[0].why_not_flown_by is None
+
+
+def test_the_shortest_cycle_that_is_said_is_long_enough():
+    """100000 cycles are allowed, and the number is rounded up."""
+    with pytest.raises(TrajcliError, match="so each is") as caught:
+        move_of(1 / 3, amplitude=A, length=1 / 3 / 150_000)
+    said = float(str(caught.value).split("each is ")[1].split()[0])
+    assert 1 / 3 <= said * 100_000 < (1 + 1e-6) / 3
+    assert move_of(1 / 3, amplitude=A, length=said)[1].path.poses.position.cycles == (100_000,)

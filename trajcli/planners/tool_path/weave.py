@@ -92,7 +92,7 @@ class WovenMove(ToolPathMove):
             InputError: When the tool only turns, or there are too many cycles.
             PlanningError: When the side is along the path.
         """
-        if self.weave is None or planned.path.length == 0:
+        if self.weave is None:
             return planned
         from trajcli.kinematics.following.weave import Weave, stops_of
 
