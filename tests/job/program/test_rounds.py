@@ -10,6 +10,7 @@ from counted_calls import calls_of
 
 from trajcli.errors import InputError
 from trajcli.job.dump import dump_job
+from trajcli.job.program.expand import ExpandedDocument
 from trajcli.job.read import job_from_text
 from trajcli.language.points import NamedTarget
 from trajcli.planning.plan import Plan, plan_job
@@ -162,6 +163,13 @@ WRONG = [
     ("  - {repeat: slot, moves: [{call: place}], lable: x}\n", 2, "unknown key 'lable'", "label"),
     ("  - {repeat: corner, moves: [{call: place}]}\n", 2, "'corner' is not many", "slot"),
     ("  - {repeat: 0, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
+    ("  - {repeat: true, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
+    (
+        "  - {repeat: slot, moves: [{call: place}]}\n  - call: place\n",
+        0,
+        "'slot' is many (6)",
+        "repeat: slot",
+    ),
     ("  - {repeat: [slot, two], moves: [{call: place}]}\n", 2, "slot is 6, two is 2", None),
     ("  - {repeat: [slot, slot], moves: [{call: place}]}\n", 2, "different names", None),
     ("  - {repeat: 2}\n", 2, "needs `moves`", None),
@@ -210,6 +218,72 @@ def test_a_sequence_that_nobody_calls_is_no_longer_than_others() -> None:
     (problem,) = caught.value.problems
     assert problem.place is not None
     assert problem.place.source.startswith("  again:")
+
+
+def test_what_no_round_reaches_is_read_too() -> None:
+    text = SECTIONS.replace("  again: [{call: again}]\n", "").replace(
+        "sequences:",
+        "  far: {grid: {from: corner, steps: [{count: 2, xyz: [1, 0, 0]}], frame: nowhere}}\nsequences:",
+    )
+    with pytest.raises(InputError, match="there is no frame 'nowhere'") as caught:
+        job_from_text(HEAD + text + "  - call: rest\n")
+    assert caught.value.problems[0].place is not None
+    assert caught.value.problems[0].place.source.startswith("  far:")
+
+
+def test_a_flaw_in_a_sequence_that_nobody_calls_is_placed_where_it_is_written() -> None:
+    """Its rounds are written out, so that the flaw is the fourth entry, and the second one in the file."""
+    lines = "  again:\n    - {repeat: 3, moves: [{call: rest}]}\n    - {planner: hold, duration: -1}\n"
+    text = SECTIONS.replace("  again: [{call: again}]\n", lines)
+    with pytest.raises(InputError, match="above 0 s, got -1") as caught:
+        job_from_text(HEAD + text + "  - call: rest\n")
+    assert caught.value.problems[0].place is not None
+    assert caught.value.problems[0].place.source == "    - {planner: hold, duration: -1}"
+
+
+def test_a_sequence_that_is_called_again_counts_again() -> None:
+    text = SECTIONS.replace("[{call: again}]", "[{repeat: 600000, moves: [{call: rest}]}]")
+    with pytest.raises(InputError, match="1200000 entries"):
+        job_from_text(HEAD + text + "  - call: again\n  - call: again\n")
+
+
+def test_rounds_within_rounds_are_those_of_both_and_the_inner_one_counts() -> None:
+    """A grid in a frame that is many: its places are the frame's plus the steps, in every round of the frame."""
+    text = """\
+frames:
+  left: {xyz: [0, 300, 0]}
+  right: {xyz: [0, -300, 0]}
+  work: [left, right]
+points:
+  first: {in: work, xyz: [400, 0, 200], rpy: [180, 0, 0], configuration: {elbow: up}}
+  slot: {grid: {from: first, steps: [{count: 2, xyz: [50, 0, 0]}]}}
+moves:
+  - repeat: work
+    label: on
+    moves: [{repeat: slot, moves: [{planner: jerk_limited, to: slot}]}]
+  - repeat: [work, slot]
+    moves: [{repeat: slot, label: in, moves: [{planner: jerk_limited, to: slot}]}]
+"""
+    loaded = job_from_text(HEAD + text)
+    places = [[0.4 + 0.05 * k, y, 0.2] for y in (0.3, -0.3) for k in range(2)]
+    found = [move.to.xyz for move in loaded.job.moves]  # type: ignore[attr-defined]
+    np.testing.assert_allclose(found, [*places, *places], rtol=0, atol=1e-12)
+    rounds = [f"{{}}work {frame} of 2{{}}slot {k} of 2" for frame in (1, 2) for k in (1, 2)]
+    outer = [f", slot {frame} of 2, in, " for frame in (1, 1, 2, 2)]
+    expected = [words.format("on, ", ", ") for words in rounds]
+    expected += [words.format("", between) for words, between in zip(rounds, outer, strict=True)]
+    document = loaded.document
+    assert isinstance(document, ExpandedDocument)
+    assert [document.round_of(index) for index in range(8)] == expected
+
+
+def test_labels_of_calls_are_in_the_words_of_a_round() -> None:
+    text = SECTIONS.replace("  again: [{call: again}]\n", "")
+    moves = "  - {call: rest, label: c}\n  - {repeat: 2, label: a, moves: [{call: rest, label: b}]}\n"
+    document = job_from_text(HEAD + text + moves).document
+    assert isinstance(document, ExpandedDocument)
+    expected = ["c", "a, round 1 of 2, b", "a, round 2 of 2, b"]
+    assert [document.round_of(index) for index in range(3)] == expected
 
 
 OUTSIDE = [  # what stands in no round: what it names, a name that is many

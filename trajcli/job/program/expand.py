@@ -82,13 +82,13 @@ class ExpandedDocument(Document):
     def plain(self) -> Any:  # noqa: ANN401
         """Return the whole as dicts, lists and scalars; moves that are one in the file are one object."""
         sections: dict[str, Node] = self.root.value  # type: ignore[assignment]
-        known: dict[int, Any] = {}
+        once: dict[int, Any] = {}
         moves: list[Node] = sections["moves"].value  # type: ignore[assignment]
         for node in moves:
-            if id(node) not in known:
-                known[id(node)] = node.plain()
+            if id(node) not in once:
+                once[id(node)] = node.plain()
         others = {key: node.plain() for key, node in sections.items() if key != "moves"}
-        return {**others, "moves": [known[id(node)] for node in moves]}
+        return {**others, "moves": [once[id(node)] for node in moves]}
 
 
 def expanded(document: Document, units: Units) -> ExpandedDocument:
@@ -122,7 +122,7 @@ class _Expansion:
             raise names.refused("expected a mapping {NAME: [move, ...]}", ("sequences",))
         self._sequences: dict[str, Node] = {} if node is None else node.value  # type: ignore[assignment]
         self._counted: dict[tuple[str, frozenset[str]], int] = {}
-        self._known: dict[tuple[Any, ...], Node] = {}
+        self._moves: dict[tuple[Any, ...], Node] = {}
 
     def document(self) -> ExpandedDocument:
         moves = self._document.node(("moves",))
@@ -134,19 +134,19 @@ class _Expansion:
                 self._check_bound(node, path, frozenset(), "name one of them")
         called = {name for name, _ in self._counted}
         entries = list(self._entries(moves, ("moves",), {}, ""))
-        rest = {name: self._uncalled(name) for name in self._sequences if name not in called}
+        others = {name: self._uncalled(name) for name in self._sequences if name not in called}
         made: dict[_Path, _Path] = {
             ("sequences", name, index): entry.path
-            for name, some in rest.items()
+            for name, some in others.items()
             for index, entry in enumerate(some)
         }
         self._names.make_the_rest()
-        root = self._root(moves, entries, rest)
+        root = self._root(moves, entries, others)
         made |= self._names.places()
         written = self._document
         return ExpandedDocument(written.file, written.lines, root, written, entries, made)
 
-    def _root(self, moves: Node, entries: list[_Entry], rest: Mapping[str, list[_Entry]]) -> Node:
+    def _root(self, moves: Node, entries: list[_Entry], others: Mapping[str, list[_Entry]]) -> Node:
         sections: dict[str, Node] = dict(self._document.root.value)  # type: ignore[arg-type]
         sections["moves"] = moves._replace(value=[entry.node for entry in entries])
         for section in SECTIONS:
@@ -156,7 +156,7 @@ class _Expansion:
         if "sequences" in sections:
             of_names = {
                 name: self._sequences[name]._replace(value=[entry.node for entry in some])
-                for name, some in rest.items()
+                for name, some in others.items()
             }
             sections["sequences"] = sections["sequences"]._replace(value=of_names)
         return self._document.root._replace(value=sections)
@@ -242,13 +242,13 @@ class _Expansion:
 
     def _count_call(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
         self._only(entry, ("call",), path)
-        at, known = (*path, "call"), self._sequences
+        at, others = (*path, "call"), self._sequences
         name = fields_of(entry)["call"].value
         if not isinstance(name, str):
             raise self._names.refused("expected the name of a sequence", at)
-        if name not in known:
+        if name not in others:
             hint = (
-                did_you_mean(name, known) or valid_names(known, "sequences") or "the job has no `sequences`"
+                did_you_mean(name, others) or valid_names(others, "sequences") or "the job has no `sequences`"
             )
             raise self._names.refused(f"there is no sequence '{name}'", at, hint)
         if name in chain:
@@ -303,6 +303,6 @@ class _Expansion:
         """Return a move in a round; one that is the same in several is one node."""
         needed = self._names.needs_of(entry)
         key = (id(entry), *(rounds[name] for name in needed))
-        if key not in self._known:
-            self._known[key] = self._names.renamed(entry, rounds)
-        return self._known[key]
+        if key not in self._moves:
+            self._moves[key] = self._names.renamed(entry, rounds)
+        return self._moves[key]
