@@ -55,6 +55,22 @@ def test_a_singular_corner_is_flown_by():
     assert plan.flyby.duration < 0.8 * plan.flyby.stopping
 
 
+@pytest.mark.parametrize("size", few([0.3, 0.2, 0.1], 1))
+def test_a_zone_that_is_left_at_half_its_size_is_flown_by_at_less(size):
+    """A joint that hardly moves has no room, however slow: the motion needs borders nearer to the corner."""
+    limits = {
+        "velocity": [[-1, 3], [-3, 0.5]],
+        "acceleration": [[-2, 8], [-8, 3]],
+        "jerk": [60, 60],
+    }
+    zone = {"joints": [size, 0.02]}
+    plan = planned(to(0.9, 1.25), to(1.0, 2.0), robot={"joints": 2}, limits=limits, zone=zone)
+    assert plan.flyby.duration < 0.96 * plan.flyby.stopping
+    (flown,) = plan.flyby.zones
+    q = plan.trajectory.curve.evaluate(np.linspace(flown.entered, flown.left, 501))
+    assert (np.abs(q - [0.9, 1.25]) <= np.array([size, 0.02]) * (1 + 1e-6)).all()
+
+
 @pytest.mark.full
 def test_a_corner_behind_which_another_branch_is_asked_for_is_refused_as_without_zones():
     line = {"planner": "line", "to": {"xyz": [0.3, 0.3, 0], "configuration": {"elbow": "down"}}, **FASTEST}

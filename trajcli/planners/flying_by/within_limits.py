@@ -33,7 +33,7 @@ from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import State
 
 _ROUNDS = 40  # of lowering the pace of parts
-_SIZES = (1.0, 0.9, 0.7, 0.5)  # of a zone, for its borders
+_SIZES = (1.0, 0.9, 0.7, 0.5, 0.3, 0.15)  # of a zone, for its borders
 _MORE = 1e-6  # beyond what is needed
 _LESS = 0.8  # where nobody knows how much is needed
 _SLOWEST = 0.05  # slower parts are stopped at instead
