@@ -13,6 +13,8 @@ import pytest
 from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError
+from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.findings import Finding
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.zone import ZoneAround
@@ -384,3 +386,42 @@ def test_what_joints_do_not_use_in_a_zone_is_lowered_at_once():
         motion = FlownPart(PiecewisePolynomial(np.array([0.0, 1.0]), times * line))
         uses = looked_for.joint_uses(motion.curve, limits)
         assert uses == pytest.approx(np.array([[share, share / 2], [0, 0], [0, 0]]))
+
+
+@pytest.mark.parametrize(
+    ("error", "far"),
+    [
+        (UnsettledSpeedError(0.1, 1.3), False),
+        (UnsettledSpeedError(0.1, 1.9), True),
+        (UnreachableSpeedError("end", 0.1, 1.01, 1.0), False),
+        (UnreachableSpeedError("end", 0.1, 1.2, 1.0), True),
+    ],
+)
+def test_where_a_law_is_far_from_its_limits_no_calmer_state_is_tried(error, far, monkeypatch):
+    """States are calmed by 3 % of their speeds and 27 % of their accelerations at most."""
+
+    def refused(*given):
+        asked.append(given)
+        raise error
+
+    chain, asked = chain_with("lines")[0], list[object]()
+    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    search.fastest(chain)
+    row, states = search._motion.row, search._motion.states
+    search._laws = CourseLaws()
+    monkeypatch.setattr(looked_for, "along_path", refused)
+    monkeypatch.setattr(looked_for, "_within_tightest", lambda *given: (None, False))
+    with pytest.raises(NoLawError) as failure:
+        search._flown(row, FoundStates(states, (search.model,)))
+    assert failure.value.far == far
+    assert (len(asked) == len(chain.courses)) == far
+    index = next(iter(failure.value.failing))
+    with pytest.raises(NoLawError) as again:
+        search._laws.along(
+            chain.courses[index],
+            index,
+            chain.stretch(index),
+            states[2 * index : 2 * index + 2],
+            chain.tempos[index],
+        )
+    assert again.value.far == far

@@ -300,7 +300,7 @@ def _on_rows(move: PlannedMove, period: float) -> PlannedMove | None:
         kept = _within_limits(other)
         if kept.duration == other.duration:
             return other
-        if kept.duration <= least:  # by another law: the same would be tried again
+        if kept.duration <= least:  # by another law
             return None
         least = kept.duration
     return None

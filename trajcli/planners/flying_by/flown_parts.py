@@ -30,7 +30,8 @@ from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
 _HOPELESS = 1.3  # times a limit after the first steps of a law between states
 _LONGER = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
-_SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
+_SLOWER = 5e-4  # by which speeds at borders may be lower: zones are flown through from what they are
+_FAR, _FAR_SPEED = 1.6, 1.03  # times a limit, a possible speed
 _SAMPLES = 9  # of a straight line, its ends included, at which bounds of its law are looked at
 _CLOSE = 5e-4  # relative: a duration above that within typical bounds at which a law is fast enough
 _BACKWARD = 1e-9  # of the length: a law that goes back by less stands still
@@ -56,11 +57,12 @@ class NoLawError(PlanningError):
 
     Attributes:
         failing: The courses, and the s at which the law of each fails; None where none is known.
+        far: Whether limits are passed so far that states nearby have no law either.
     """
 
-    def __init__(self, reason: str, failing: Mapping[int, float | None]) -> None:
+    def __init__(self, reason: str, failing: Mapping[int, float | None], far: bool = False) -> None:
         super().__init__(f"no law is found along a path between two zones: {reason}")
-        self.reason, self.failing = reason, dict(failing)
+        self.reason, self.failing, self.far = reason, dict(failing), far
 
 
 class CourseLaws:
@@ -100,7 +102,7 @@ class CourseLaws:
             self._found[key] = course, _law_between(course, index, stretch, states, tempo)
         found = self._found[key][1]
         if isinstance(found, NoLawError):
-            raise NoLawError(found.reason, found.failing)
+            raise found.with_traceback(None)
         return found
 
 
@@ -116,8 +118,10 @@ def _law_between(
         return simple
     try:
         found = along_path(course, stretch, states, tempo)
-    except (UnreachableSpeedError, UnsettledSpeedError) as error:
-        return simple or NoLawError(str(error), {index: error.s})
+    except UnreachableSpeedError as error:
+        return simple or NoLawError(str(error), {index: error.s}, error.speed > _FAR_SPEED * error.allowed)
+    except UnsettledSpeedError as error:
+        return simple or NoLawError(str(error), {index: error.s}, error.over > _FAR)
     except ReversingLawError as error:
         return simple or NoLawError(str(error), {index: None})
     return found if simple is None or found.curve.duration < simple.curve.duration else simple
@@ -159,7 +163,7 @@ def flown_parts(
         states: sd and sdd at the nodes, the ends included, (N, 2).
         laws: Of courses.
         known: Motions along courses that are known, by number.
-        doubtful: Courses that are tried before the others: where they fail, those are not looked for.
+        doubtful: Courses that are tried first: where they fail, no others are.
 
     Raises:
         NoLawError: When some courses have no law between their borders.
@@ -177,7 +181,8 @@ def flown_parts(
             except NoLawError as error:
                 failed.append(error)
         if failed:
-            raise NoLawError(failed[0].reason, {k: s for error in failed for k, s in error.failing.items()})
+            every = {k: s for error in failed for k, s in error.failing.items()}
+            raise NoLawError(failed[0].reason, every, any(error.far for error in failed))
     parts = [courses[0]]
     for k, corner in enumerate(chain.corners):
         before, behind = courses[k], courses[k + 1]
@@ -357,8 +362,8 @@ def move_part(chain: FlyByChain, number: int, part: FlownPart, start: float) -> 
 def joint_uses(curve: PiecewisePolynomial, limits: Limits) -> Array:
     """Return what part of their limits of velocity, acceleration and jerk joints use at most, (3, n)."""
     bounds = (limits.of_order(order).T for order in (1, 2, 3))
-    extremes = zip(peaks(curve, (1, 2, 3)), bounds, strict=True)
-    return np.array([np.maximum(peak.low / low, peak.high / high) for peak, (low, high) in extremes])
+    both = zip(peaks(curve, (1, 2, 3)), bounds, strict=True)
+    return np.array([np.maximum(peak.low / low, peak.high / high) for peak, (low, high) in both])
 
 
 def state_at(curve: PiecewisePolynomial, time: float) -> State:

@@ -145,6 +145,8 @@ class MotionSearch:
             except NoLawError as error:
                 failed.append(error)
                 self._doubtful.update(error.failing)
+            if failed[-1].far:
+                raise failed[0]
             calm = {self._failing(index, s) for index, s in failed[-1].failing.items()}
             found = self._calmed(calm, row, found.states)
             if len(failed) > _CALMINGS or found.duration > longest:
@@ -275,7 +277,7 @@ class MotionSearch:
         return shares
 
     def _over(self, states: Array) -> list[tuple[list[Finding], Array]]:
-        """Return what is wrong with the motion through each zone, and what its joints use at most, (3,)."""
+        """Return what is wrong with the motion through each zone, and what its joints use, (3,)."""
         over = []
         for k, corner in enumerate(self.chain.corners):
             borders = states[2 * k + 1 : 2 * k + 3]
