@@ -63,12 +63,12 @@ class ChainProgram:
             ahead = pairs.ahead(change, 1.0).gap
             centre = min(1.0, max(ahead, 0.0) / between) ** 3 * between / pairs.count
             dx, change = newton.step(centre, change)
-            most = self._positive(x, dx)
-            moved = x + min(pairs.reach(change, _TO_BORDER)[0], most) * dx
+            bound = self._positive(x, dx)
+            moved = x + min(pairs.reach(change, _TO_BORDER)[0], bound) * dx
             if not (1.0 + _times(self.samples, moved) > _ROUNDING).all():
                 break
             x = moved
-            pairs = pairs.ahead(change, _TO_BORDER, most)
+            pairs = pairs.ahead(change, _TO_BORDER, bound)
         return x
 
     def _first_pairs(self) -> _Pairs:
@@ -127,7 +127,7 @@ class _Pairs:
     @property
     def count(self) -> int:
         """Number of products that tend to zero."""
-        return self.slack.size * (2 if self.elastic else 1)
+        return self.slack.size * (1 + self.elastic)
 
     @property
     def gap(self) -> float:
@@ -147,16 +147,15 @@ class _Pairs:
         passed, over = _reach(self.passed, change.passed, share), _reach(self.over, change.over, share)
         return min(slack, passed), min(dual, over)
 
-    def ahead(self, change: _Pairs, share: float, most: float = 1.0) -> _Pairs:
+    def ahead(self, change: _Pairs, share: float, bound: float = 1.0) -> _Pairs:
         """Return the pairs after as much of a change as may be taken."""
         slack, dual = self.reach(change, share)
-        slack = min(slack, most)
-        over = self.over + dual * change.over if self.elastic else self.over
+        slack = min(slack, bound)
         return _Pairs(
             self.slack + slack * change.slack,
             self.dual + dual * change.dual,
             self.passed + slack * change.passed,
-            over,
+            self.over + dual * change.over,
         )
 
 
