@@ -226,6 +226,25 @@ def test_a_law_that_comes_nearer_slowly_is_waited_for(seed):
     judged(*problem, **how)
 
 
+@pytest.mark.parametrize(("left", "accepted"), [(0.8e-4, True), (4e-4, True), (6e-4, False)])
+def test_what_no_step_takes_away_is_left_to_slowing_down_by_little(left, accepted, monkeypatch):
+    """Five times as much as steps may leave; the ends are slower by it, which those who ask for it can bear."""
+
+    def settle(search, *given):
+        search.stretch = 1.0 + left
+        found.append(search.best)
+
+    (problem, how), found = between_states(110), []
+    monkeypatch.setattr(parameterization._Search, "settle", settle)
+    if not accepted:
+        with pytest.raises(UnsettledSpeedError):
+            jerk_limited_time_optimal(*problem, **how)
+        return
+    law = jerk_limited_time_optimal(*problem, **how).law
+    assert law.duration == pytest.approx(found[0].duration * (1.0 + left), rel=1e-9)
+    assert law.evaluate(0.0, 1)[0] == pytest.approx(how["start"][0] / (1.0 + left), rel=1e-9)
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("block", range(100))
 def test_a_thousand_random_problems_keep_all_limits(block, tally):

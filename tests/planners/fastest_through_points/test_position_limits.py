@@ -32,7 +32,7 @@ def drawn(seed: int) -> tuple[WaypointProblem, Values, Values]:
         np.zeros(3),
         np.stack([points.min(axis=0) - 0.01, points.max(axis=0) + 0.01], axis=1),
     )
-    states = problem.inside(rng.uniform(-0.6, 0.6, (4, 2, 2)) * [[1.0, 2.0], [2.0, 2.0]])
+    states = 0.98 * problem.inside(rng.uniform(-0.6, 0.6, (4, 2, 2)) * [[1.0, 2.0], [2.0, 2.0]])
     return problem, durations(problem, states) * 1.2, states
 
 

@@ -50,6 +50,7 @@ _LOWERED, _LOWERED_MORE = 1.1, 1.5  # times the excess that limits are lowered b
 _LOWEST = 1e6  # times that a limit is lowered by: where that does not help nothing does
 _PENALTY = 1.0  # of the duration, for passing a limit by its size at one place
 _STUBBORN = 1.005  # of a limit: where it is passed by more although it was lowered, nodes are missing
+_ACCEPTED = 5.0  # times how much slower a motion may be, in the end
 _EXACT = 1e-10  # a limit exceeded by less is kept
 _SETTLED = 2e-5  # of the duration: less is left to slowing down
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step, the largest first that leads forward
@@ -102,7 +103,7 @@ def jerk_limited_time_optimal(
         hopeless: With velocities at the ends, how many times a limit may be passed after the first steps:
             with more nobody waits for it to be kept.
         slower: By what part the velocities at the ends may be lower than given, where the whole is slowed
-            down by that little to keep the limits.
+            down by that little to keep the limits; five times that where no step leads there.
 
     Raises:
         UnlimitedSpeedError: When nothing limits the motion somewhere.
@@ -128,7 +129,7 @@ def jerk_limited_time_optimal(
     lost = search.refine(most, np.inf if ends.rests else hopeless)
     search.settle(most, _SETTLING if ends.rests or hasty else _MOST_SETTLING)
     law, stretch = search.best, search.stretch
-    if stretch > 1.0 + search.slower and not ends.rests:
+    if stretch > 1.0 + max(_ACCEPTED * slower, _EXACT) and not ends.rests:
         raise search.unsettled()
     curve, trajectory = law_and_trajectory(path, law.pieces)
     if stretch > 1.0 + _EXACT:

@@ -30,7 +30,7 @@ from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
 _HOPELESS = 1.3  # times a limit after the first steps of a law between states
 _LONGER = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
-_SLOWER = 5e-4  # by which speeds at borders may be lower: zones are flown through from what they are
+_SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
 _FAR, _FAR_SPEED = 1.6, 1.03  # times a limit, a possible speed
 _SAMPLES = 9  # of a straight line, its ends included, at which bounds of its law are looked at
 _CLOSE = 5e-4  # relative: a duration above that within typical bounds at which a law is fast enough
