@@ -208,3 +208,29 @@ def test_a_state_that_is_no_waypoint_is_refused_where_it_is_named(point: str) ->
     assert problem.message == "a waypoint needs `joints` or a pose"
     assert problem.place is not None
     assert (problem.place.line, underlined(problem)) == (10, point)
+
+
+def test_the_hint_to_a_number_as_a_key_works_for_joints_and_for_points() -> None:
+    text = """\
+version: 1
+robot: {joints: [{name: "1"}, {name: "2"}]}
+points: {7: {joints: {1: 3, 2: 4}}}
+start: {joints: 0}
+moves: [{planner: quintic, to: 7, duration: 1}]
+"""
+    with pytest.raises(InputError) as caught:
+        job_from_text(text)
+    hints = [(p.place and p.place.column, p.hint) for p in caught.value.problems]
+    assert hints == [(n, f'write "{k}", of a point p{k}') for n, k in ((10, 7), (23, 1), (29, 2))]
+    text = text.replace("{7:", "{p7:").replace("to: 7", "to: p7").replace("1: 3, 2:", '"1": 3, "2":')
+    assert job_from_text(text).job.points["p7"].joints == (3.0, 4.0)
+
+
+def test_a_pair_in_the_place_of_a_list_is_one_of_numbers() -> None:
+    for pair, hint in (("[-1, 2]", "{NAME: [-1, 2]}"), ("[true, 2]", None), ("[-1, 2, 3]", None)):
+        text = f"version: 1\nrobot: {{joints: {3 if '3' in pair else 2}}}\nlimits: {{velocity: {pair}}}\n"
+        with pytest.raises(InputError) as caught:
+            job_from_text(f"{text}start: {{joints: 0}}\nmoves: [{{planner: hold, duration: 1}}]\n")
+        (problem,) = caught.value.problems
+        assert (problem.hint or "").endswith(hint or "")
+        assert bool(problem.hint) == (hint is not None)

@@ -17,7 +17,6 @@ from pydantic import (
     GetJsonSchemaHandler,
     TypeAdapter,
     ValidationError,
-    field_validator,
     model_validator,
 )
 from pydantic.json_schema import JsonSchemaValue
@@ -30,6 +29,7 @@ from trajcli.language.dynamics import Gravity, NamedTool, ToolField
 from trajcli.language.limits import JobLimitsSpec
 from trajcli.language.numbers import (
     AT_KEY,
+    NO_TRUTH,
     FieldType,
     FlawError,
     Model,
@@ -145,9 +145,7 @@ def _first_row(value: Mapping[str, Any], context: ReadingContext) -> dict[str, A
         raise FlawError(f"csv and {other} exclude each other", other, AT_KEY, hint="leave one of them out")
     if not isinstance(value["csv"], str):
         raise FlawError(f"expected the path of a file, got {shown(value['csv'])}", "csv")
-    if context.read_points is None:
-        return {"joints": 0}  # the robot has flaws of its own
-    first = context.read_points(value["csv"]).positions[0]
+    first = context.read_points(value["csv"]).positions[0]  # type: ignore[misc]
     return {"joints": PerJoint(0, "").write(tuple(first.tolist()), context)}
 
 
@@ -339,7 +337,7 @@ class FramePose(Pose):
 class Job(Model):
     """One robot, named points, and the moves to plan."""
 
-    version: Annotated[Literal[1], Field(description="Version of the job language: 1.")]
+    version: Annotated[Literal[1], NO_TRUTH, Field(description="Version of the job language: 1.")]
     name: Annotated[str, Name("For reports; the file's stem when left out.")] | None = None
     units: UnitsSpec = UnitsSpec()
     robot: Annotated[Robot, RobotSource()]
@@ -408,13 +406,6 @@ class Job(Model):
         | None
     ) = None
     output: Output = Output()
-
-    @field_validator("version", mode="before")
-    @classmethod
-    def _version_is_a_number(cls, value: Any) -> Any:  # noqa: ANN401
-        if isinstance(value, bool):  # true equals 1 in Python
-            raise refuse([((), f"expected 1, got {shown(value)}", None)])
-        return value
 
     @model_validator(mode="after")
     def _start_is_a_state(self) -> Job:

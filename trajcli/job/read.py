@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _STRUCTURES = frozenset(("repeat", "call", "approach", "retreat"))
 """Keys of entries among the moves that stand for other moves."""
-_GOALS = ("to", "through", "segments", "line", "arc", "point")
+_GOALS = ("to", "through", "segments", "line", "arc")
 """Keys under which an entry of the moves says where it ends, the last first."""
 _RECORDED = ("start", "through", "segments")
 """Keys under which a file of places may be named."""
@@ -226,7 +226,7 @@ def files_of(document: Document) -> Iterator[tuple[str, str]]:
     """Yield the files that a job was read from: what each is, and its path; standard input is `-`."""
     standard = document.file in ("-", "<stdin>")
     yield "the job", "-" if standard else document.file
-    folder = Path() if standard else Path(document.file).parent
+    folder = Path(document.file).parent
     root = document.plain()
     robot, sequences = root.get("robot"), root.get("sequences")
     while isinstance(robot, Mapping) and "arm" in robot:  # on a rail
@@ -269,8 +269,8 @@ def _load(document: Document) -> LoadedJob:
     if robot is not None:
         context.base = _base(plain.get("base"), context, robot)
         context.joint_names, context.joint_types = robot.joint_names, robot.joint_types
-        context.read_points = partial(_recorded, document, robot)
-        context.read_poses = partial(_recorded_poses, document)
+    context.read_points = partial(_recorded, document, robot)
+    context.read_poses = partial(_recorded_poses, document)
     try:
         job = Job.model_validate({**plain, **given}, context=context)
     except ValidationError as error:
@@ -388,8 +388,12 @@ def _texts(node: Node | None) -> Iterator[str]:
         yield from _texts(below)
 
 
-def _recorded(document: Document, robot: Robot, path: str) -> Recorded:
+def _recorded(document: Document, robot: Robot | None, path: str) -> Recorded:
     """Return the recording of a path; jobs without one do not pay for the import."""
+    if robot is None:
+        from trajcli.language.recorded import Recorded
+
+        return Recorded(np.zeros((1, 1)))
     from trajcli.job.files.recorded_values import read_recording
 
     return read_recording(path, document, robot)

@@ -31,6 +31,7 @@ from trajcli.language.efforts import EffortBound
 from trajcli.language.limits import JointBound, VelocityByPosition
 from trajcli.language.numbers import (
     MAX_JOINTS,
+    NO_TRUTH,
     Model,
     Name,
     Number,
@@ -65,7 +66,7 @@ class JointModel(Model):
         float,
         Number(_ANGLE, "Angle about y behind alpha, where axes are almost parallel (Hayati; angle unit)."),
     ] = 0.0
-    sign: Annotated[Literal[1, -1], Field(description="Direction in which the joint counts.")] = 1
+    sign: Annotated[Literal[1, -1], NO_TRUTH, Field(description="Direction in which the joint counts.")] = 1
     position: Annotated[LowerUpper, JointBound(0, "Range [lower, upper] (angle or length unit).")] = UNLIMITED
     velocity: Annotated[LowerUpper, JointBound(1, "Velocity limit, or [lower, upper], per s.")] = UNLIMITED
     acceleration: Annotated[LowerUpper, JointBound(2, "Acceleration limit, or [lower, upper], per s^2.")] = (
@@ -433,7 +434,7 @@ def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet
         if not isinstance(given, kind):
             place = document.place(("robot", key))
             raise InputError(Problem(f"expected {wanted}, got {shown(given)}", None, place))
-    path = str(_folder_of(document) / value["urdf"])
+    path = str(Path(document.file).parent / value["urdf"])
     try:
         return urdf_sheet(path, read_urdf(path, **{key: value[key] for key in value if key != "urdf"}))
     except FileError as error:
@@ -465,11 +466,6 @@ def _looks_like_a_path(name: str) -> bool:
     return "/" in name or "\\" in name or name.endswith((".yaml", ".yml"))
 
 
-def _folder_of(document: Document) -> Path:
-    """Return the folder from which the paths in a document count."""
-    return Path.cwd() if document.file in ("-", "<stdin>") else Path(document.file).parent
-
-
 def _from_file_entry(value: Mapping[str, Any], document: Document) -> RobotSheet:
     extra = [key for key in value if key != "file"]
     if extra:
@@ -480,7 +476,7 @@ def _from_file_entry(value: Mapping[str, Any], document: Document) -> RobotSheet
         place = document.place(("robot", "file"))
         raise InputError(Problem(f"expected a path, got {shown(value['file'])}", None, place))
     try:
-        return read_sheet(str(_folder_of(document) / value["file"]))
+        return read_sheet(str(Path(document.file).parent / value["file"]))
     except FileError as error:
         raise error.located(place=document.place(("robot", "file"))) from None
 

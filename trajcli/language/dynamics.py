@@ -23,13 +23,12 @@ from trajcli.language.numbers import (
     Model,
     Number,
     ReadingContext,
-    number_schema,
     refuse,
     shown,
     written_number,
 )
 from trajcli.language.per_joint import UNLIMITED
-from trajcli.language.poses import ROTATIONS, Pose, read_numbers
+from trajcli.language.poses import ROTATIONS, Pose, numbers_schema, read_numbers
 from trajcli.language.targets import Numbers
 from trajcli.units import Quantity
 
@@ -52,8 +51,7 @@ class Gravity(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of three numbers."""
-        items = number_schema(Quantity("length", 2))
-        return {"type": "array", "items": items, "minItems": 3, "maxItems": 3}
+        return numbers_schema(3, Quantity("length", 2))
 
 
 class FrictionSpec(Model):

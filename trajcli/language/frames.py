@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from trajcli.curves.piecewise import Array
-from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext, shown, written_number
-from trajcli.language.poses import Pose
+from trajcli.language.numbers import AT_KEY, FlawError, ReadingContext, flaws_below, shown, written_number
+from trajcli.language.poses import Pose, moved
 from trajcli.language.targets import AIMS, PoseFields
 from trajcli.units import Quantity
 
@@ -60,10 +60,8 @@ def frame_named(name: Any, context: ReadingContext, chain: tuple[str, ...] = ())
     if name not in context.placed:
         try:
             context.placed[name] = pose_of_frame(context.frames[name], context, (*chain, name))
-        except _ChainError as error:
-            raise _ChainError(str(error), hint=error.flaws[0][2]) from None
-        except FlawError as error:
-            error.flaws = []
+        except FlawError as error:  # of another flaw the frame's own place tells
+            error.flaws = [((), *flaw[1:]) for flaw in error.flaws if isinstance(error, _ChainError)]
             raise
     return context.placed[name]
 
@@ -80,20 +78,9 @@ def pose_of_frame(value: Any, context: ReadingContext, chain: tuple[str, ...] = 
         return moved(origin, offset, frame_named(value["frame"], context, chain)[:3, :3])
     if not isinstance(value, Mapping) or "in" not in value:
         return Pose("").read(value, context)
-    try:
+    with flaws_below("in"):
         outer = frame_named(value["in"], context, chain)
-    except FlawError as error:
-        error.flaws = error.below("in")
-        raise
     return np.asarray(outer @ Pose("").read({key: value[key] for key in value if key != "in"}, context))
-
-
-def moved(pose: Array, offset: Array, axes: Array) -> Array:
-    """Return a pose (4, 4) after an offset (4, 4) along and about axes (3, 3), about its own origin."""
-    result = np.eye(4)
-    result[:3, :3] = axes @ offset[:3, :3] @ axes.T @ pose[:3, :3]
-    result[:3, 3] = pose[:3, 3] + axes @ offset[:3, 3]
-    return result
 
 
 def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any]:
@@ -105,11 +92,8 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
     """
     rest = {key: item for key, item in value.items() if key != "in"}
     given = {key: rest[key] for key in PoseFields.model_fields if key in rest}
-    try:
+    with flaws_below("in"):
         frame = frame_named(value["in"], context)
-    except FlawError as error:
-        error.flaws = error.below("in")
-        raise
     try:
         pose = PoseFields.model_validate(given, context=context)
     except ValidationError:
@@ -122,8 +106,8 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
         for key in (pose.rotation_form or "", *AIMS):
             fields.pop(key, None)
         fields |= _turned(pose, frame[:3, :3], str(value["in"]))
-    elif pose.rotation_form == "matrix":
-        fields["matrix"] = pose.full_pose()[:3, :3].tolist()
+    elif pose.matrix is not None:
+        fields["matrix"] = pose.given_rotation.tolist()
     if pose.gives_position:
         position = frame[:3, :3] @ pose.full_pose()[:3, 3] + frame[:3, 3]
         fields["xyz"] = [written_number(x, Quantity("length")) for x in position.tolist()]
@@ -133,7 +117,7 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
 def _turned(pose: PoseFields, axes: Array, name: str) -> dict[str, Any]:
     """Return the orientation of a pose, or the part of one, turned by the axes (3, 3) of a frame."""
     if pose.rotation_form is not None:
-        return {"matrix": (axes @ pose.full_pose()[:3, :3]).tolist()}
+        return {"matrix": (axes @ pose.given_rotation).tolist()}
     if pose.direction is not None:
         return {"direction": (axes @ np.array(pose.direction)).tolist()}
     if pose.yaw is None and pose.pitch is None:

@@ -19,6 +19,7 @@ from trajcli.language.numbers import (
     Number,
     ReadingContext,
     check_not_tiny,
+    flaws_below,
     read_number,
     shown,
     written_number,
@@ -65,10 +66,8 @@ def read_bound(value: Any, quantity: Quantity, context: ReadingContext) -> Lower
 
 
 def _read_end(value: Any, index: int, quantity: Quantity, context: ReadingContext) -> float:  # noqa: ANN401
-    try:
+    with flaws_below(index):
         return UNLIMITED[index] if value is None else read_number(value, quantity, context.units)
-    except FlawError as error:
-        raise FlawError(str(error), index, hint=error.flaws[0][2]) from None
 
 
 def written_bound(

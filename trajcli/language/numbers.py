@@ -1,21 +1,23 @@
 """Numbers with units, as field types of pydantic models, and the base of these models.
 
 A field type is an annotation, such as `Annotated[float, Number(...)]`, that pydantic asks for a validator
-and for a JSON schema; it carries unit, bounds and description. The reading context says which units the file
-uses and which joints the robot has; without one (a planner built in Python) values are SI.
+and a JSON schema. The reading context says which units the file uses and which joints the robot has; without
+one (a planner built in Python) values are SI.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
@@ -121,6 +123,16 @@ class FlawError(ValueError):
         return [((*keys, *path), text, hint) for path, text, hint in self.flaws]
 
 
+@contextmanager
+def flaws_below(*keys: str | int) -> Iterator[None]:
+    """Put flaws from within below some keys."""
+    try:
+        yield
+    except FlawError as error:
+        error.flaws = error.below(*keys)
+        raise
+
+
 def refuse(flaws: Sequence[Flaw]) -> PydanticCustomError:
     """Return the error that carries the flaws of one value through pydantic."""
     return PydanticCustomError(
@@ -136,7 +148,7 @@ NULL = _Null()
 
 
 def flaw_of_name(name: str) -> str | None:
-    """Return what is wrong with a name that a file gives; None where nothing is.
+    """Return what is wrong with a name; None where nothing is.
 
     Control characters in a name could write commands into the log of a continuous integration.
     """
@@ -199,9 +211,7 @@ def _largest(quantity: Quantity) -> float:
 
 
 def magnitude_schema(quantity: Quantity, *, positive: bool = False) -> JsonSchemaValue:
-    """Return the bounds of a plain number in a JSON schema, which does not know the units of the file.
-
-    They are those of the unit that allows most, the upper one rounded up to three digits.
+    """Return the bounds of a plain number in a JSON schema, of the unit that allows most, to three digits.
 
     Args:
         quantity: What the number measures; a length, where it may be an angle or a length.
@@ -235,9 +245,7 @@ def _least(quantity: Quantity) -> float:
 
 
 def within_bounds(number: float, value: object, quantity: Quantity, units: Units) -> float:
-    """Return a number in SI, unless no robot has such.
-
-    The bounds are far from what any robot needs: they keep powers of numbers, and sums of them, finite.
+    """Return a number in SI, unless no robot has such: powers of numbers, and sums of them, stay finite.
 
     Args:
         number: SI.
@@ -272,6 +280,16 @@ def written_number(value: float, quantity: Quantity) -> float | str:
     if quantity.dimension not in ("angle", "length"):
         return value
     return f"{value!r} {unit_name(quantity, Units())}"
+
+
+def _no_truth(value: Any) -> Any:  # noqa: ANN401
+    if isinstance(value, bool):
+        raise refuse([((), f"expected a number, got {shown(value)}", None)])
+    return value
+
+
+NO_TRUTH = BeforeValidator(_no_truth)
+"""Refuses true, which equals 1 in Python."""
 
 
 class FieldType:

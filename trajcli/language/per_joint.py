@@ -60,6 +60,11 @@ def read_per_joint(
         raise FlawError(f"expected a list with one value for each joint, got {shown(value)}")
     else:
         items = dict.fromkeys(range(len(names or ("",))), (None, value))
+    if names is None and context is not SI:  # of a robot with flaws: which joints slide is not known
+        for i, (key, item) in items.items():
+            if isinstance(item, str | list) and str(item).lstrip("-+.['")[:1].isdigit():
+                items[i] = key, 1
+        return _read_items(items, names, read_one, missing)[:1]
     return _read_items(items, names, read_one, missing)
 
 
@@ -130,11 +135,10 @@ def read_each(items: Iterable[tuple[K, Any]], read: Callable[[K, Any], V]) -> di
     return values
 
 
-def with_pair_hint(error: FlawError, value: object) -> FlawError:
+def with_pair_hint(error: FlawError, value: Any) -> FlawError:  # noqa: ANN401
     """Return the error of bounds by joint; where a pair stands in the place of a list, it says what to do."""
-    pair = isinstance(value, list | tuple) and len(value) == 2
-    if pair and all(isinstance(v, int | float) for v in value):  # type: ignore[attr-defined]
-        named = f"a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"  # type: ignore[call-overload]
+    if isinstance(value, list | tuple) and [type(v) in (int, float) for v in value] == [True, True]:
+        named = f"a list has one entry for each joint: for a pair write {{NAME: {list(value)}}}"
         error.flaws = [(path, text, named) for path, text, _ in error.flaws]
     return error
 

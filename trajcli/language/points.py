@@ -13,8 +13,17 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from trajcli.curves.piecewise import Array
-from trajcli.language.numbers import AT_KEY, SI, FlawError, ReadingContext, refuse, shown, written_number
-from trajcli.language.poses import Pose
+from trajcli.language.numbers import (
+    AT_KEY,
+    SI,
+    FlawError,
+    ReadingContext,
+    flaws_below,
+    refuse,
+    shown,
+    written_number,
+)
+from trajcli.language.poses import Pose, moved
 from trajcli.language.targets import AIMS, RELATIVE, PoseFields, Relative, Target
 from trajcli.units import Quantity
 
@@ -272,11 +281,8 @@ def _name_in(value: Mapping[str, Any], context: ReadingContext) -> str:
     name = value["from"]
     if not isinstance(name, str):
         raise FlawError(f"expected the name of a point, got {shown(name)}", "from")
-    try:
+    with flaws_below("from"):
         return _names_from(name, context)[-1]
-    except FlawError as error:
-        error.flaws = error.below("from")
-        raise
 
 
 def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: ReadingContext) -> _Fields:
@@ -303,20 +309,15 @@ def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: 
         beside = {"joints": point["joints"], **beside}
     if point is None or ("joints" in point and not pinned) or "joints_by" in point or RELATIVE in point:
         if axes is not None:
-            turned = np.eye(4)
-            turned[:3, :3], turned[:3, 3] = axes @ offset[:3, :3] @ axes.T, axes @ offset[:3, 3]
-            offset = turned
+            offset = moved(np.eye(4), offset, axes)
         rows = tuple(map(tuple, offset.tolist()))
         return {RELATIVE: Relative(name, rows, axes is not None), **beside}
     return {**_displaced(name, _pose_of(name, point, context), offset, axes), **beside}
 
 
 def _offset(value: Mapping[str, Any], context: ReadingContext) -> Array:
-    try:
+    with flaws_below("offset"):
         return Pose("").read(value.get("offset", {}), context)
-    except FlawError as error:
-        error.flaws = error.below("offset")
-        raise
 
 
 def _axes(frame: Any, context: ReadingContext) -> Array | None:  # noqa: ANN401
@@ -325,11 +326,8 @@ def _axes(frame: Any, context: ReadingContext) -> Array | None:  # noqa: ANN401
         return None if frame == "tool" else np.eye(3)
     from trajcli.language.frames import frame_named
 
-    try:
+    with flaws_below("frame"):
         return frame_named(frame, context)[:3, :3]
-    except FlawError as error:
-        error.flaws = error.below("frame")
-        raise
 
 
 def _pose_of(name: str, point: _Fields, context: ReadingContext) -> PoseFields:
@@ -364,9 +362,9 @@ def _displaced(name: str, pose: PoseFields, offset: Array, axes: Array | None) -
     fields = pose.model_dump(context=ReadingContext(), exclude_none=True, exclude={"xyz"})
     if turns or pose.rotation_form == "matrix":
         kept = fields.keys() - {pose.rotation_form, *AIMS}
-        rotation = np.array([row[:3] for row in pose.matrix[:3]]) if pose.matrix else at[:3, :3]
+        rotation = pose.given_rotation
         if turns:
             turn = offset[:3, :3] if axes is None else axes @ offset[:3, :3] @ axes.T
-            rotation = at[:3, :3] @ turn if axes is None else turn @ at[:3, :3]
+            rotation = rotation @ turn if axes is None else turn @ rotation
         fields = {**{key: fields[key] for key in kept}, "matrix": rotation.tolist()}
     return {"xyz": [written_number(float(x), Quantity("length")) for x in position], **fields}

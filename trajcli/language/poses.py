@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -33,11 +33,25 @@ if TYPE_CHECKING:
 
 MAKERS = ("abb", "kuka", "fanuc")
 """Makers whose flags of a configuration are known."""
-SEQUENCES = ("XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ")
+EulerSequence = Literal["XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ"]
+SEQUENCES = get_args(EulerSequence)
 ROTATIONS = ("rpy", "quat_wxyz", "quat_xyzw", "rotvec", "matrix", "axis_angle", "euler")
 """The forms of a full orientation."""
 _ROUNDING = 1e-14  # a rotation written with all its digits stays as it stands, bit by bit
+_NO_LENGTH = 1e-100  # below it squares vanish
 _ANGLE, _LENGTH, _RATIO = Quantity("angle"), Quantity("length"), Quantity("ratio")
+
+
+def numbers_schema(count: int, quantity: Quantity) -> JsonSchemaValue:
+    """Return the schema of a list of numbers."""
+    return {"type": "array", "items": number_schema(quantity), "minItems": count, "maxItems": count}
+
+
+AXIS_SCHEMA: JsonSchemaValue = {"anyOf": [{"enum": ["x", "y", "z"]}, numbers_schema(3, _RATIO)]}
+"""Schema of the name of an axis, or three numbers."""
+_ROW = {"type": "array", "items": number_schema(_LENGTH), "minItems": 3, "maxItems": 4}
+MATRIX_SCHEMA: JsonSchemaValue = {**_ROW, "items": _ROW}
+"""Schema of three or four rows; in the last column may stand lengths."""
 
 
 @comparable
@@ -74,23 +88,12 @@ class Pose(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a pose."""
-
-        def numbers(count: int, quantity: Quantity) -> JsonSchemaValue:
-            return {
-                "type": "array",
-                "items": number_schema(quantity),
-                "minItems": count,
-                "maxItems": count,
-            }
-
-        axis = {"anyOf": [{"enum": ["x", "y", "z"]}, numbers(3, _RATIO)]}
+        numbers = numbers_schema
         euler = {
             "sequence": {"enum": list(SEQUENCES)},
             "frame": {"enum": ["current", "fixed"]},
             "angles": numbers(3, _ANGLE),
         }
-        entry = number_schema(_LENGTH)  # a ratio, or in the last column a length
-        rows = {"type": "array", "items": {"type": "array", "items": entry, "minItems": 3, "maxItems": 4}}
         described = {
             "xyz": {**numbers(3, _LENGTH), "description": "Position (length unit)."},
             "rpy": {
@@ -103,18 +106,21 @@ class Pose(FieldType):
                 **numbers(3, _ANGLE),
                 "description": "Axis times angle, as rx, ry, rz of a UR pendant (angle unit).",
             },
-            "matrix": {
-                **rows,
-                "minItems": 3,
-                "maxItems": 4,
-                "description": "Rotation 3x3, or homogeneous 4x4.",
-            },
+            "matrix": {**MATRIX_SCHEMA, "description": "Rotation 3x3, or homogeneous 4x4."},
             "axis_angle": _object(
-                {"axis": axis, "angle": number_schema(_ANGLE)}, "Rotation by an angle about an axis."
+                {"axis": AXIS_SCHEMA, "angle": number_schema(_ANGLE)}, "Rotation by an angle about an axis."
             ),
             "euler": _object(euler, "Euler angles about current or fixed axes.", "sequence", "angles"),
         }
         return {"type": "object", "properties": described, "additionalProperties": False}
+
+
+def moved(pose: Array, offset: Array, axes: Array) -> Array:
+    """Return a pose (4, 4) after an offset (4, 4) along and about axes (3, 3), about its own origin."""
+    result = np.eye(4)
+    result[:3, :3] = axes @ offset[:3, :3] @ axes.T @ pose[:3, :3]
+    result[:3, 3] = pose[:3, 3] + axes @ offset[:3, 3]
+    return result
 
 
 def _object(properties: Mapping[str, Any], description: str, *required: str) -> JsonSchemaValue:
@@ -125,20 +131,19 @@ def _object(properties: Mapping[str, Any], description: str, *required: str) -> 
 
 def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -> Array:
     pose = np.eye(4)
-    if form == "matrix" and isinstance(value["matrix"], list) and len(value["matrix"]) == 4:
-        if "xyz" in value:
-            raise FlawError(
-                "a 4x4 matrix already has a position", "xyz", hint="leave xyz out, or give a 3x3 matrix"
-            )
-        return _homogeneous(value["matrix"], context)
     if form is not None:
         try:
-            pose[:3, :3] = _READERS[form](value[form], context)
+            read = _READERS[form](value[form], context)
         except InputError as error:
             raise FlawError(str(error), form, hint=error.problems[0].hint) from None
         except FlawError as error:
             error.flaws = error.below(form)
             raise
+        if len(read) == 4 and "xyz" in value:
+            raise FlawError(
+                "a 4x4 matrix already has a position", "xyz", hint="leave xyz out, or give a 3x3 matrix"
+            )
+        pose[: len(read), : len(read)] = read
     if "xyz" in value:
         pose[:3, 3] = read_numbers(value["xyz"], 3, _LENGTH, context, "xyz")
     return pose
@@ -171,31 +176,30 @@ def _homogeneous(rows: list[Any], context: ReadingContext) -> Array:
     for index, row in enumerate(rows[:3]):
         if not isinstance(row, list) or len(row) != 4:
             got = f"{len(row)} values" if isinstance(row, list) else shown(row)
-            raise FlawError(f"expected a row of 4 numbers, got {got}", "matrix", index)
-        pose[index, :3] = read_numbers(row[:3], 3, _RATIO, context, "matrix", index)
-        pose[index, 3] = read_numbers(row[3:], 1, _LENGTH, context, "matrix", index)[0]
-    last = read_numbers(rows[3], 4, _RATIO, context, "matrix", 3)
+            raise FlawError(f"expected a row of 4 numbers, got {got}", index)
+        pose[index, :3] = read_numbers(row[:3], 3, _RATIO, context, index)
+        pose[index, 3] = read_numbers(row[3:], 1, _LENGTH, context, index)[0]
+    last = read_numbers(rows[3], 4, _RATIO, context, 3)
     if (last != [0, 0, 0, 1]).any():
         row = ", ".join(f"{number:.9g}" for number in last.tolist())
-        raise FlawError(f"the last row of a 4x4 matrix must be [0, 0, 0, 1], it is [{row}]", "matrix", 3)
-    pose[:3, :3] = _projected(pose[:3, :3], "matrix")
+        raise FlawError(f"the last row of a 4x4 matrix must be [0, 0, 0, 1], it is [{row}]", 3)
+    pose[:3, :3] = _projected(pose[:3, :3])
     return pose
 
 
 def _matrix(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    if isinstance(value, list) and len(value) == 4:
+        return _homogeneous(value, context)
     if not isinstance(value, list) or len(value) != 3:
         got = f"{len(value)} rows" if isinstance(value, list) else shown(value)
         raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {got}")
     return _projected(np.stack([read_numbers(row, 3, _RATIO, context, i) for i, row in enumerate(value)]))
 
 
-def _projected(matrix: Array, *path: str) -> Array:
+def _projected(matrix: Array) -> Array:
     from trajcli.geometry.rotation import check_rotation, nearest_rotation
 
-    try:
-        check_rotation(matrix)
-    except InputError as error:
-        raise FlawError(str(error), *path, hint=error.problems[0].hint) from None
+    check_rotation(matrix)
     off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     return matrix if off <= _ROUNDING else nearest_rotation(matrix)
 
@@ -243,14 +247,19 @@ def read_axis(value: Any, context: ReadingContext, *path: str) -> Array:  # noqa
     Raises:
         FlawError: When it is neither, or has no direction.
     """
+    numbers = read_direction(value, context, *path)
+    return numbers / float(np.linalg.norm(numbers))
+
+
+def read_direction(value: Any, context: ReadingContext, *path: str | int) -> Array:  # noqa: ANN401
+    """Return three numbers (3,), or x, y or z as such, likewise."""
     if isinstance(value, str) and value in ("x", "y", "z"):
-        unit: Array = np.eye(3)["xyz".index(value)]
-        return unit
+        return np.asarray(np.eye(3)["xyz".index(value)])
     numbers = read_numbers(value, 3, _RATIO, context, *path)
-    length = float(np.linalg.norm(numbers))
-    if length == 0:
-        raise FlawError("an axis of length 0 has no direction", *path)
-    return numbers / length
+    length = np.linalg.norm(numbers)
+    if length < _NO_LENGTH:
+        raise FlawError(f"an axis of length {length:g} has no direction", *path)
+    return numbers
 
 
 def _euler(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401

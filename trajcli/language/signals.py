@@ -9,8 +9,8 @@ from typing import Any, Literal, get_args
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
-from trajcli.language.numbers import AT_KEY, FlawError, Name, Number, ReadingContext, shown
-from trajcli.language.per_joint import flawed, read_each
+from trajcli.language.numbers import AT_KEY, FlawError, Name, Number, ReadingContext, flaws_below, shown
+from trajcli.language.per_joint import read_each
 from trajcli.units import Quantity
 
 Moment = Literal["enter", "nearest", "leave"]
@@ -124,8 +124,6 @@ def _read_when(value: Any, context: ReadingContext) -> str | float:  # noqa: ANN
     if isinstance(value, str) and value in _MOMENTS:
         return value
     if isinstance(value, Mapping) and list(value) == ["path"]:
-        try:
+        with flaws_below("path"):
             return float(_PATH.read(value["path"], context))
-        except FlawError as error:
-            raise flawed(error.below("path")) from None
     raise FlawError(f"expected {', '.join(_MOMENTS)} or {{path: L}}, got {shown(value)}")

@@ -28,13 +28,23 @@ from trajcli.language.numbers import (
     Model,
     Number,
     ReadingContext,
-    number_schema,
     refuse,
     shown,
     written_number,
 )
 from trajcli.language.per_joint import NamedValues, PerJoint
-from trajcli.language.poses import ROTATIONS, Configuration, Pose, read_numbers
+from trajcli.language.poses import (
+    AXIS_SCHEMA,
+    MATRIX_SCHEMA,
+    ROTATIONS,
+    Configuration,
+    EulerSequence,
+    Pose,
+    moved,
+    numbers_schema,
+    read_direction,
+    read_numbers,
+)
 from trajcli.trajectory import State
 from trajcli.units import Quantity
 
@@ -74,8 +84,7 @@ class Numbers(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of the list."""
-        items = number_schema(self.quantity)
-        return {"type": "array", "items": items, "minItems": self.count, "maxItems": self.count}
+        return numbers_schema(self.count, self.quantity)
 
 
 @comparable
@@ -86,25 +95,11 @@ class Direction(FieldType):
 
     def read(self, value: Any, context: ReadingContext) -> Row:  # noqa: ANN401
         """Return the three numbers."""
-        if isinstance(value, str) and value in ("x", "y", "z"):
-            return tuple(float(name == value) for name in "xyz")
-        numbers = tuple(read_numbers(value, 3, _RATIO, context).tolist())
-        if not any(numbers):
-            raise FlawError("an axis of length 0 has no direction")
-        return numbers
-
-    def write(self, value: Row, context: ReadingContext) -> list[float]:
-        """Return the three numbers."""
-        return list(value)
+        return tuple(read_direction(value, context).tolist())
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a name or three numbers."""
-        return {
-            "anyOf": [
-                {"enum": ["x", "y", "z"]},
-                {"type": "array", "items": number_schema(_RATIO), "minItems": 3, "maxItems": 3},
-            ]
-        }
+        return AXIS_SCHEMA
 
 
 @comparable
@@ -137,9 +132,7 @@ class Matrix(FieldType):
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of three or four rows."""
-        entry = number_schema(_LENGTH)  # a ratio, or in the last column a length
-        row = {"type": "array", "items": entry, "minItems": 3, "maxItems": 4}
-        return {"type": "array", "items": row, "minItems": 3, "maxItems": 4}
+        return MATRIX_SCHEMA
 
 
 class AxisAngleSpec(Model):
@@ -152,10 +145,7 @@ class AxisAngleSpec(Model):
 class EulerSpec(Model):
     """Euler angles."""
 
-    sequence: Annotated[
-        Literal["XYX", "XYZ", "XZX", "XZY", "YXY", "YXZ", "YZX", "YZY", "ZXY", "ZXZ", "ZYX", "ZYZ"],
-        Field(description="The axes, in the order of the angles."),
-    ]
+    sequence: Annotated[EulerSequence, Field(description="The axes, in the order of the angles.")]
     frame: Annotated[Literal["current", "fixed"], Field(description="Whose axes they are.")] = "current"
     angles: Annotated[Row, Numbers(3, _ANGLE, "The three angles (angle unit).")]
 
@@ -230,6 +220,11 @@ class PoseFields(Model):
         """Whether the position is fixed."""
         return self.xyz is not None or (self.matrix is not None and len(self.matrix) == 4)
 
+    @property
+    def given_rotation(self) -> Array:
+        """The orientation (3, 3); a matrix as it is given."""
+        return self.full_pose()[:3, :3] if self.matrix is None else np.array([r[:3] for r in self.matrix[:3]])
+
     def full_pose(self) -> Array:
         """Return the pose (4, 4), lengths in m; what is not given is zero."""
         written: dict[str, Any] = {} if self.xyz is None else {"xyz": self.xyz}
@@ -291,9 +286,7 @@ class Relative:
         offset = np.array(self.offset)
         if not self.in_world:
             return np.asarray(pose @ offset)
-        result = np.eye(4)
-        result[:3, :3], result[:3, 3] = offset[:3, :3] @ pose[:3, :3], pose[:3, 3] + offset[:3, 3]
-        return result
+        return moved(pose, offset, np.eye(3))
 
 
 RELATIVE, NEAR, PINNED = "\0relative", "\0near", "\0pinned"

@@ -15,6 +15,7 @@ from trajcli.language.numbers import (
     FlawError,
     Number,
     ReadingContext,
+    flaws_below,
     number_schema,
     refuse,
     shown,
@@ -102,7 +103,8 @@ def _recorded(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
     if ("csv" in value) == ("positions" in value):
         raise FlawError("expected a list of waypoints, {csv: PATH} or {positions: [...]}")
     points = _from_file(value, context) if "csv" in value else _inline(value, context)
-    merge = _merge(value["merge"], context) if "merge" in value else ()
+    with flaws_below("merge"):
+        merge = _MERGE.read(value["merge"], context) if "merge" in value else ()
     return Recorded(points.positions, points.times, points.file, merge)
 
 
@@ -128,20 +130,14 @@ def _inline(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
         except FlawError as error:
             error.flaws = error.below("positions", index)
             raise
+    if len(counts := {len(row) for row in positions}) > 1:
+        raise FlawError(f"expected rows of as many values, got {counts}", "positions")
     if "times" not in value:
         return Recorded(np.array(positions))
     times = read_numbers(value["times"], len(positions), _TIME, context, "times")
     if (np.diff(times) <= 0).any():
         raise FlawError("times must increase", "times", int(np.flatnonzero(np.diff(times) <= 0)[0]) + 1)
     return Recorded(np.array(positions), times)
-
-
-def _merge(value: Any, context: ReadingContext) -> tuple[float, ...]:  # noqa: ANN401
-    try:
-        return _MERGE.read(value, context)
-    except FlawError as error:
-        error.flaws = error.below("merge")
-        raise
 
 
 def _written(recorded: Recorded, context: ReadingContext) -> dict[str, Any]:

@@ -90,10 +90,9 @@ class SignalsField(FieldType):
 
 def _read_parts(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any]:
     """Return what a mapping limits, in SI."""
-    unknown = [key for key in value if key not in _PARTS]
-    if unknown or not value:
-        listed = ", ".join(_PARTS)
-        if not value:
-            raise FlawError(f"a zone needs one of {listed}")
+    unknown, listed = [key for key in value if key not in _PARTS], ", ".join(_PARTS)
+    if unknown:
         raise FlawError(f"a zone has no '{unknown[0]}'", unknown[0], AT_KEY, hint=f"it has {listed}")
+    if not value:
+        raise FlawError(f"a zone needs one of {listed}")
     return read_each(value.items(), lambda key, item: _PARTS[key].read(item, context))

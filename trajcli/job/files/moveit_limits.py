@@ -84,7 +84,7 @@ def read_moveit_limits(path: str, document: Document, robot: Robot) -> MoveItLim
         InputError: With every flaw of the file, each with its place there.
         FileError: When it cannot be read; with the place of its name in the job.
     """
-    folder = Path() if document.file in ("-", "<stdin>") else Path(document.file).parent
+    folder = Path(document.file).parent
     try:
         limits = read_document(str(folder / path))
     except FileError as error:

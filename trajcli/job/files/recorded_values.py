@@ -16,7 +16,7 @@ from trajcli.language.numbers import LARGEST_POSITION, FlawError
 from trajcli.language.recorded import Recorded, RecordedPoses
 from trajcli.streams.table import Table, read_csv
 
-_OF_TIME = re.compile(r"(t|time|timestamp|secs?|seconds)([ _\[(].*)?")
+_OF_TIME = re.compile(r"(ts?|time|(time)?stamp|secs?|seconds)([ _\[(].*)?")
 _OF_TURN = re.compile(r"(r[xyz]|rpy|roll|pitch|yaw|rot|rotvec|quat|quaternion|q[wxyz])([ _\[(].*)?")
 
 
@@ -33,17 +33,12 @@ def read_recording(path: str, document: Document, robot: Robot) -> Recorded:
         FlawError: When it is not as it should be.
     """
     try:
-        return _recorded(read_csv(folder_of(document) / path), robot)
+        return _recorded(read_csv(Path(document.file).parent / path), robot)
     except FileError as error:
         raise error.located(place=document.place(named_at(document, path, "through"))) from None
     except InputError as error:
         flaws = "; ".join(map(placed_text, error.problems))
         raise FlawError(flaws, "csv", hint=error.problems[0].hint) from None
-
-
-def folder_of(document: Document) -> Path:
-    """Return the folder that paths in a job are relative to."""
-    return Path() if document.file.startswith(("<", "-")) else Path(document.file).parent
 
 
 def named_at(document: Document, path: str, field: str) -> tuple[str | int, ...]:
@@ -161,7 +156,7 @@ def read_poses(path: str, document: Document) -> RecordedPoses:
         FlawError: When it is not as it should be.
     """
     try:
-        table = read_csv(folder_of(document) / path)
+        table = read_csv(Path(document.file).parent / path)
         return RecordedPoses(_positions(table), _quaternions(table), table.file)
     except FileError as error:
         raise error.located(place=document.place(named_at(document, path, "segments"))) from None

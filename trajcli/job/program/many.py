@@ -18,7 +18,7 @@ MOST_ENTRIES = 1_000_000
 SECTIONS = ("points", "frames")
 """Where names stand that may be many."""
 _LENGTH = Quantity("length")
-_NAMING = ("to", "via", "center", "line", "in", "from", "frame")
+_NAMING = ("to", "via", "line", "in", "from", "frame")
 """Keys whose text names a point or a frame; so do the texts of a list under `through`."""
 _OTHER_TEXTS = ("euler", "configuration", "label", "planner", "signal", "tool")
 

@@ -256,10 +256,10 @@ class _Walk:
         elif not key.text:
             message = "a key is missing before the colon"
         else:
-            message, hint = (
-                f"the key {key.text} is no name",
-                self._decimal_comma(key) or f'write "{key.text}"',
-            )
+            hint = f'write "{key.text}"'
+            if not isinstance(name, bool | None):
+                hint = self._decimal_comma(key) or f"{hint}, of a point p{key.text}"
+            message = f"the key {key.text} is no name"
         self._report(message, key, hint)
         return None
 

@@ -1,0 +1,121 @@
+"""Orientations and axes of jobs in every form, against scipy."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from tiers import few
+
+from trajcli.errors import InputError
+from trajcli.job.dump import dump_job
+from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.planning.plan import plan_job
+
+UNITS = {"deg": ("deg", "mm", 180 / np.pi, 1e3), "rad": ("rad", "m", 1.0, 1.0)}
+MOVES = "moves: [{planner: quintic, to: {joints: [0.1, -1, 1, 0, 1, 0]}, duration: 3}]\n"
+SEQUENCES = [a + b + c for a in "XYZ" for b in "XYZ" for c in "XYZ" if a != b != c]
+TURN = Rotation.from_rotvec([0.4, -1.1, 0.7])
+XYZ = (0.001, -2.5, 3.0)
+
+
+def forms(turn: Rotation, angle: float) -> dict[str, object]:
+    """Return an orientation in every form, angles times a factor."""
+    x, y, z, w = turn.as_quat().tolist()
+    axis, size = turn.as_rotvec() / turn.magnitude(), turn.magnitude()
+    return {
+        "rpy": (turn.as_euler("xyz") * angle).tolist(),
+        "quat_wxyz": [w, x, y, z],
+        "quat_xyzw": [x, y, z, w],
+        "rotvec": (turn.as_rotvec() * angle).tolist(),
+        "matrix": turn.as_matrix().tolist(),
+        "axis_angle": {"axis": (-7 * axis).tolist(), "angle": -float(size) * angle},
+    } | {
+        f"euler {name} {frame}": {
+            "sequence": name,
+            "angles": (turn.as_euler(name if frame == "current" else name.lower()) * angle).tolist(),
+            **({} if frame == "current" else {"frame": frame}),
+        }
+        for name in SEQUENCES
+        for frame in ("current", "fixed")
+    }
+
+
+CASES = [(unit, form) for unit in UNITS for form in forms(TURN, 1)]
+
+
+@pytest.mark.filterwarnings("ignore:Gimbal lock")
+@pytest.mark.parametrize(("unit", "form"), CASES)
+def test_every_form_is_the_rotation_of_scipy(unit: str, form: str) -> None:
+    """A tool, a base and a point are read alike; the point is that again in the resolved job."""
+    angle, length, per_rad, per_m = UNITS[unit]
+    value = {"xyz": [x * per_m for x in XYZ], form.split(maxsplit=1)[0]: forms(TURN, per_rad)[form]}
+    expected = np.eye(4)
+    expected[:3, :3], expected[:3, 3] = TURN.as_matrix(), XYZ
+    plain = dict.fromkeys(("tool", "base"), value) | {"points": {"p": value}, "start": {"joints": 0}}
+    head = f"version: 1\nrobot: ur5e\nunits: {{angle: {angle}, length: {length}}}\n"
+    text = head + "".join(f"{key}: {json.dumps(item)}\n" for key, item in plain.items())
+    job = job_from_text(text + MOVES)
+    again = job_from_text(dump_job(job).replace("angle: deg, length: mm", "angle: rad, length: m"))
+    for each in (job, again):
+        for read in (each.robot.tool, each.robot.base, each.job.points["p"].full_pose()):
+            np.testing.assert_allclose(read, expected, rtol=1e-15, atol=3e-15)
+    assert np.array_equal(job.job.points["p"].full_pose(), again.job.points["p"].full_pose())
+
+
+def job_with(points: str, head: str = "", moves: str = MOVES) -> LoadedJob:
+    start = "start: {joints: [0, -1.5, 1.5, 0, 1.5, 0]}\n"
+    return job_from_text(f"version: 1\nrobot: ur5e\n{start}{head}points:\n{points}{moves}", "job.yaml")
+
+
+def test_a_turn_about_the_name_of_an_axis_and_its_vector_are_one() -> None:
+    for index, name in enumerate("xyz"):
+        vector = [3.0 * (k == index) for k in range(3)]
+        text = f"  a: {{axis_angle: {{axis: {name}, angle: 0.3}}}}\n"
+        text += f"  b: {{axis_angle: {{axis: {vector}, angle: 0.3}}}}\n  c: {{direction: {name}}}\n"
+        points = job_with(text).job.points
+        expected = Rotation.from_rotvec(0.3 * np.eye(3)[index]).as_matrix()
+        for point in ("a", "b"):
+            np.testing.assert_allclose(points[point].full_pose()[:3, :3], expected, atol=1e-15)
+        assert points["c"].direction == tuple(np.eye(3)[index])
+
+
+@pytest.mark.parametrize("vector", ["[0, 0, 0]", "[1e-200, 0, 0]", "[0, -1e-170, 1e-170]"])
+def test_axes_whose_length_vanishes_in_squares_are_refused_where_they_stand(vector: str) -> None:
+    """Of a rail they were NaN in the base of the robot."""
+    texts = [
+        f"version: 1\nrobot: {{rail: {{axis: {vector}}}, arm: ur5e}}\nstart: {{joints: 0}}\n{MOVES}",
+        f"version: 1\nrobot: ur5e\ntool: {{axis_angle: {{axis: {vector}, angle: 1}}}}\nstart: {{joints: 0}}\n{MOVES}",
+        f"version: 1\nrobot: ur5e\nstart: {{joints: 0}}\npoints: {{p: {{direction: {vector}}}}}\n{MOVES}",
+    ]
+    for text in texts:
+        with pytest.raises(InputError, match="an axis of length 0 has no direction") as caught:
+            job_from_text(text)
+        place = caught.value.problems[0].place
+        assert place is not None
+        assert place.source[place.column - 1 :].startswith(vector)
+
+
+OFF = "matrix: [[1, 0, 4e-5], [0, 1, 0], [0, 0, 1]]"
+NOTED = [
+    ("", f"  p: {{xyz: [0.4, 0, 0.3], {OFF}}}\n"),
+    ("frames: {f: {xyz: [0, 0, 0.01]}}\n", f"  p: {{in: f, xyz: [0.4, 0, 0.3], {OFF}}}\n"),
+    ("frames: {f: {rpy: [0, 0, 0.1]}}\n", f"  p: {{in: f, xyz: [0.4, 0, 0.3], {OFF}}}\n"),
+    ("", f"  b: {{xyz: [0.4, 0, 0.3], {OFF}}}\n  p: {{from: b, offset: {{xyz: [0, 0, 0.01]}}}}\n"),
+    ("", f"  b: {{xyz: [0.4, 0, 0.3], {OFF}}}\n  p: {{from: b, offset: {{rpy: [0, 0, 0.01]}}}}\n"),
+    ("", f"  b: {{xyz: [0.4, 0, 0.3], {OFF}}}\n  p: {{from: b, offset: {{rpy: [0, 0, 0.1]}}, frame: world}}\n"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("head", "points"), few(NOTED, 4))
+def test_a_matrix_that_is_off_a_rotation_is_noted_wherever_its_pose_is_given(head: str, points: str) -> None:
+    move = "moves: [{planner: quintic, to: p, duration: 9}]\n"
+    plan = plan_job(job_with(points, head, move))
+    events = [event.message for event in (*plan.events, *plan.remarks)]
+    assert "the matrix is off a rotation by 4e-05: the nearest one is taken" in events
+    exact = plan_job(job_with(points.replace("4e-5", "0"), head, move))
+    assert "off a rotation" not in str([*exact.events, *exact.remarks])
+    ends = [each.trajectory.curve.evaluate(each.trajectory.duration, side="left") for each in (plan, exact)]
+    assert 1e-6 < np.abs(ends[0] - ends[1]).max() < 2e-4
