@@ -175,6 +175,10 @@ def test_no_law_along_a_path_is_taken_to_be_faster_than_its_bounds():
     start, end = np.zeros((1, 2)), np.array([[0.246, 4.0]])
     assert part.durations(start, end)[0, 0] > 0.3 / 0.25
     assert part.durations(end * [1, -1], start)[0, 0] > 0.3 / 0.25
+    slow = np.array([[0.0, -12.0]])  # what was built up before it asks for 1.2 there, not on the whole path
+    assert part.durations(start, slow)[0, 0] >= 0.3 / 0.25
+    assert part.durations(slow * [1, -1], start)[0, 0] >= 0.3 / 0.25
+    assert part.durations(np.array([[0.5, 0.0]]), np.array([[0.5, 0.0]]))[0, 0] == pytest.approx(0.3 / 0.5)
 
 
 @pytest.mark.parametrize("moves", MOVES)
@@ -425,3 +429,26 @@ def test_where_a_law_is_far_from_its_limits_no_calmer_state_is_tried(error, far,
             chain.tempos[index],
         )
     assert again.value.far == far
+
+
+@pytest.mark.parametrize(("moves", "start"), [("lines", [0.05, 0.2]), ("joints", [0.3, -0.5])])
+def test_a_chain_that_begins_in_motion_does_so_at_any_pace(moves, start):
+    """Also as fast as it is told to and not by a ten thousandth slower, as laws beside zones may be."""
+    chain, _ = chain_with(moves)
+    chain = replace(chain, ends=(np.array(start), np.zeros(2)))
+    first, bend = chain.courses[0].curve.evaluate_orders(np.zeros(1), (1, 2))[0]
+    asked = start[0] * first, start[1] * first + start[0] ** 2 * bend
+    for pace in (1.0, 0.6):
+        laws, slow = StoppingLaws(CourseLaws()), with_shares(chain, pace ** POWERS[None])
+        laws.slow_all(slow)
+        states = np.array([*laws.states(slow).values()])
+        for part in (
+            laws.parts(slow)[0],
+            CourseLaws().along(
+                chain.courses[0], 0, chain.stretch(0), np.stack([chain.ends[0], states[0]]), 1.0
+            ),
+        ):
+            for order, rates in enumerate(asked, 1):
+                assert part.curve.evaluate(part.curve.start, order) == pytest.approx(
+                    rates, rel=1e-9, abs=1e-12
+                )

@@ -172,3 +172,39 @@ def test_a_job_that_is_aligned_flies_by_in_whole_periods() -> None:
     assert periods == pytest.approx(round(periods), abs=1e-9)
     assert 0 <= periods - 100 * free.trajectory.duration < 1
     assert aligned.flyby.searched == pytest.approx(free.flyby.searched, rel=1e-9)
+
+
+def test_a_start_in_motion_is_kept_where_a_chain_would_have_to_be_stretched() -> None:
+    """Another duration of the same motion begins at another speed: then the arm stops, in whole periods, too."""
+    rates = [0.6, 0.05]  # along the first line
+    fields = {"limits": {"velocity": 3, "acceleration": 8, "jerk": 60}, "zone": 0.02}
+    start = {"joints": [0.3, 1.2], "velocity": rates}
+    moves = to(0.9, 1.25), to(1.0, 2.0)
+    free, aligned = (
+        plan_job(loaded(*moves, start=start, **fields, output={"rate": 100, "align": align}))
+        for align in (False, True)
+    )
+    assert free.flyby is not None
+    assert free.flyby.zones
+    assert aligned.trajectory(0.0, 1) == pytest.approx(rates, abs=1e-12)
+    assert 100 * aligned.trajectory.duration == pytest.approx(round(100 * aligned.trajectory.duration))
+    (event,) = aligned.events
+    assert event.kind == "not_faster"
+    assert "begins at a speed" in event.message
+
+
+def test_a_path_that_bends_where_the_arm_moves_already_is_left_to_the_move_that_stops() -> None:
+    """The joints come without the acceleration that its curvature takes at that speed: a step of it is none."""
+    path = {"planner": "time_optimal", "through": [{"joints": [0.6, 1.5]}], "to": {"joints": [0.9, 1.25]}}
+    fields = {"limits": {"velocity": 3, "acceleration": 8, "jerk": 60}, "zone": 0.02}
+    free = loaded(path, to(1.0, 2.0), start={"joints": [0.3, 1.2]}, **fields)
+    first = plan_job(free).moves[0]
+    along = first.planner.course(first.start.position, first.robot, first.planned).curve.evaluate(0.0, 1)
+    rates = (0.4 / abs(along).max() * along).tolist()
+    run_up = {"planner": "jerk_limited", "to": {"joints": [0.3, 1.2], "velocity": rates}}
+    start = {"joints": [0.3 - 0.2 * rates[0], 1.2 - 0.2 * rates[1]]}
+    made = plan_job(loaded({**run_up, "zone": "stop"}, path, to(1.0, 2.0), start=start, **fields))
+    assert not made.verdict.findings
+    (event,) = made.events
+    assert event.kind == "not_faster"
+    assert "bends where the joints start" in event.message

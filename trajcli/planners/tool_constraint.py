@@ -83,6 +83,7 @@ class ToolConstraint:
         limits: Of its speed and acceleration, linear and angular.
         speeds: Limits of both speeds that step along the path, in their place; None where they do not.
         oblique: Whether p'' has a part along p' that counts, as where s is not the arc length.
+        deceleration: Largest -sdd.
     """
 
     estimate: ClassVar[float] = 1.0
@@ -91,11 +92,13 @@ class ToolConstraint:
     limits: ToolLimits
     speeds: SteppingSpeeds | None = None
     oblique: bool = False
+    deceleration: float = math.inf
 
     @property
     def bounds_sdd(self) -> bool:
         """Whether some acceleration is bounded."""
-        return bool(np.isfinite([self.limits.acceleration, self.limits.angular_acceleration]).any())
+        limits = self.limits
+        return min(limits.acceleration, limits.angular_acceleration, self.deceleration) < math.inf
 
     def rows(self, s: Array, side: Side) -> ConstraintRows:
         """Return rows and caps at points (p,) of the path.
@@ -115,8 +118,9 @@ class ToolConstraint:
         with np.errstate(divide="ignore"):
             speed = np.minimum(most / tangent, most_angular / turning)
         cap = np.minimum(speed**2, angular[3])
-        joined = [np.concatenate(pair, axis=1) for pair in zip(linear, angular[:3], strict=True)]
-        return ConstraintRows(joined[0], joined[1], joined[2], cap)
+        slowing = [np.full((s.size, 1), each) for each in (-1.0, 0.0, self.deceleration)]
+        a, b, c = (np.hstack(each) for each in zip(linear, angular[:3], slowing, strict=True))
+        return ConstraintRows(a, b, c, cap)
 
     def largest(self, s: Array, side: Side) -> Array:
         """Return the largest sd^2 at points (p,), by speeds and by the accelerations across the path."""
@@ -150,6 +154,7 @@ class ToolConstraint:
         rate, change = sd[:, None], sdd[:, None]
         acceleration = second * rate**2 + first * change
         used = _used(first * rate, acceleration, self._speeds(s, "right"), self.limits)
+        used[1] = np.maximum(used[1], -sdd / self.deceleration)
         return np.asarray(used.reshape(2, *shape).max(axis=1))
 
     def _along(self, first: Array, second: Array) -> Array:

@@ -146,6 +146,10 @@ def _chain(
     amounts: Amounts = {"stopping": Amount(stopping)}
     try:
         chain = _fastest(moves, corners, adapted)
+        if adapted is not None:
+            chain = stretched_chain(chain, max(adapted.stretches.get(move.index, 1.0) for move in moves))
+        if loaded.job.output.align:
+            chain = _aligned(chain, loaded.job.output.rate)
     except MissingLimitError as error:
         raise error.located(place=loaded.place_of_move(moves[0].index)) from None
     except PlanningError as error:
@@ -156,10 +160,6 @@ def _chain(
         message = f"stops at the {corners_of}: {reason}"
         events.append(Event("not_faster", message, moves[0].index, {**amounts, **problem.amounts}))
         return None
-    if adapted is not None:
-        chain = stretched_chain(chain, max(adapted.stretches.get(move.index, 1.0) for move in moves))
-    if loaded.job.output.align:
-        chain = _aligned(chain, loaded.job.output.rate)
     if chain.duration < stopping * (1 - _FASTER):
         return chain
     message = "flying by its corners is no faster than stopping there, which takes {stopping}"

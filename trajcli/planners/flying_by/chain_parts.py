@@ -144,8 +144,10 @@ class PathPart:
         limits = np.tile(self.bounds, (len(before), 1))
         if self.typical:
             _leave_room(limits, before, after)
-        steps = np.full(len(before), self.length)
-        return fastest_durations(steps, np.hstack([before, after]), limits).reshape(len(first), len(last))
+        ends, steps = np.hstack([before, after]), np.full(len(before), self.length)
+        least = steps / ends[:, ::2].max(axis=1, initial=self.bounds[1])  # whatever room is left
+        found = np.maximum(fastest_durations(steps, ends, limits), least)
+        return found.reshape(len(first), len(last))
 
 
 def _leave_room(limits: Array, before: Array, after: Array) -> None:

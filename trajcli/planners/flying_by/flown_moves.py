@@ -12,7 +12,7 @@ import numpy as np
 
 from trajcli.curves.operations import cut, scale_time, times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
-from trajcli.errors import Amount, Amounts
+from trajcli.errors import Amount, Amounts, PlanningError
 from trajcli.frozen import frozen
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import QUANTITIES, Robot
@@ -286,9 +286,15 @@ def _phases(parts: Sequence[MoveInterval]) -> Iterator[Phase]:
 
 
 def stretched_chain(chain: FlownChain, factor: float) -> FlownChain:
-    """Return the chain that lasts `factor` times longer."""
+    """Return the chain that lasts `factor` times longer.
+
+    Raises:
+        PlanningError: When it begins in motion.
+    """
     if factor == 1:
         return chain
+    if chain.chain.ends[0].any():
+        raise PlanningError("a motion that begins at a speed cannot be stretched")
     parts = tuple(
         FlownPart(
             scale_time(part.curve, factor),

@@ -235,7 +235,7 @@ def along_path(course: Course, stretch: tuple[float, float], states: Array, temp
             further=further,
             further_jerk=course.jerk_constraints,
             hopeless=_HOPELESS,
-            slower=_SLOWER,
+            slower=0.0 if v0 and not stretch[0] else _SLOWER,  # a chain starts as it is told
         )
     else:
         solved = time_optimal(path, *bounds, start_velocity=v0, end_velocity=v1, further=further)

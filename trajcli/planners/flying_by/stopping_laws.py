@@ -59,10 +59,10 @@ class StoppingLaws:
         course = chain.courses[index]
         return self._laws.along(course, index, (0.0, course.length), self.ends(chain, index), 1.0)
 
-    @staticmethod
-    def ends(chain: FlyByChain, index: int) -> Array:
-        """Return the states of that motion at the start and at the end, (2, 2)."""
-        return np.stack([np.zeros(2) if index else chain.ends[0], np.zeros(2)])
+    def ends(self, chain: FlyByChain, index: int) -> Array:
+        """Return the states of that motion at the start and at the end, (2, 2): as fast as its pace asks for."""
+        start = np.zeros(2) if index else chain.ends[0] / self._pace(chain, 0) ** np.arange(1, 3)
+        return np.stack([start, np.zeros(2)])
 
     def slow(self, chain: FlyByChain, index: int, s: float | None, states: Array) -> None:
         """Take the state at a border of a course that has no law nearer to that of a motion that stops.

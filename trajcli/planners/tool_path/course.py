@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -50,7 +51,13 @@ class ToolCourse(Course):
     @property
     def limits_tool(self) -> bool:
         """Whether something limits the tool along it."""
-        return self.joints.path.speeds is not None or super().limits_tool
+        return self.joints.path.speeds is not None or self.deceleration < math.inf or super().limits_tool
+
+    @property
+    def deceleration(self) -> float:
+        """Largest -sdd by its law, which says none of a turn in place."""
+        given = self.law.deceleration
+        return math.inf if given is None or self.joints.path.poses.pure_rotation else given
 
     @property
     def limits_along(self) -> tuple[float, float, float] | None:
@@ -66,7 +73,7 @@ class ToolCourse(Course):
         speed, change = (
             (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)
         )
-        return speed, change, change if self.law.deceleration is None else min(change, self.law.deceleration)
+        return speed, change, min(change, self.deceleration)
 
     @property
     def jerk_constraints(self) -> tuple[ThirdOrderConstraint, ...]:
@@ -80,7 +87,8 @@ class ToolCourse(Course):
 
     def tool_constraint(self) -> PathConstraint:
         """Return the limits of the tool along it."""
-        return ToolConstraint(self.joints.limited_by(self.tcp), self.tcp, self.joints.path.speeds)
+        speeds, tool = self.joints.path.speeds, self.joints.limited_by(self.tcp)
+        return ToolConstraint(tool, self.tcp, speeds, deceleration=self.deceleration)
 
     def rates(self, s: Array) -> PathRates:
         """Return derivatives at s (m,), with the lowest limits of speed there, where these step."""
@@ -96,16 +104,9 @@ class ToolCourse(Course):
         tcp = self.tcp
         if rates.speeds is not None:
             tcp = replace(tcp, speed=rates.speeds[0], angular_speed=rates.speeds[1])
-        about, deceleration = law_bounds(rates, self.robot.limits, tcp), self.law.deceleration
-        if deceleration is None:
-            return about
-
-        def slowing(states: Array) -> Array:
-            bounds = about(states)
-            bounds[:, 2] = np.maximum(bounds[:, 2], -deceleration)
-            return bounds
-
-        return slowing
+        about, least = law_bounds(rates, self.robot.limits, tcp), np.full(6, -np.inf)
+        least[2] = -self.deceleration
+        return lambda states: np.maximum(about(states), least)
 
     def reference(self, law: PiecewisePolynomial) -> ToolMotion | None:
         """Return the reference of the tool under a law s(t)."""
