@@ -207,4 +207,4 @@ def test_a_path_that_bends_where_the_arm_moves_already_is_left_to_the_move_that_
     assert not made.verdict.findings
     (event,) = made.events
     assert event.kind == "not_faster"
-    assert "bends where the joints start" in event.message
+    assert "bends where the joints start in motion" in event.message

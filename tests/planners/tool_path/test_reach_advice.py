@@ -34,3 +34,14 @@ def test_freeing_the_orientation_is_proposed_where_it_helps(by, helps):
         plan("elbow4r", start, line(to, law=LAW), limits=FREE)
     else:
         refusal("elbow4r", start, line(to, law=LAW), limits=FREE)
+
+
+def test_a_target_by_joints_says_how_the_way_to_its_place_is_free():
+    """An arm of four joints cannot turn the tool evenly on a line; it can go there with the turn that it has."""
+    start, to = {"joints": JOINTS}, np.array([0.5, 0.4, -1.1, 0.2])
+    error = refusal("elbow4r", start, line({"joints": to.tolist()}, law=LAW), limits=FREE)
+    assert error.problems[0].advice().endswith("give the target by `xyz` alone")
+    xyz = forward(arm("elbow4r"), to)[:3, 3]
+    plan("elbow4r", start, line({"xyz": xyz.tolist()}, law=LAW), limits=FREE)
+    pose = refusal("elbow4r", start, line({"xyz": xyz.tolist(), "rpy": [0, 0, 0]}, law=LAW), limits=FREE)
+    assert "alone" not in pose.problems[0].advice()

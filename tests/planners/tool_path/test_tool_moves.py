@@ -257,6 +257,25 @@ def test_joints_as_target():
     assert "instead of" in str(error)
 
 
+@pytest.mark.parametrize(
+    ("name", "q", "to"),
+    [
+        ("planar2r", [0.2, 1.0], [0.7, 1.6]),
+        ("elbow", [0.2, 1.0, -0.9], [0.7, 0.9, -1.1]),
+        ("cylindrical", [0.2, 0.3, 0.3], [0.7, 0.4, 0.4]),
+        ("planar3r", [0.2, 1.0, 0.2], [0.7, 1.5, -0.3]),
+        ("scara", [0.2, 1.0, 0.1, 0.0], [0.7, 1.5, 0.2, 0.9]),
+    ],
+)
+def test_joints_are_a_target_of_arms_with_few_joints(name, q, to):
+    """Where the place decides them the tool turns as the arm lets it, else evenly."""
+    places = forward(arm(name), np.array([q, to]))[:, :3, 3]
+    made = plan(name, {"joints": q}, line({"joints": to}), when_over_limit="slow")
+    np.testing.assert_allclose(made.trajectory.end.position, to, atol=3e-6)
+    along = poses_of(made, times_of(made))[:, :3, 3] - places[0]
+    assert np.linalg.norm(np.cross(along, np.diff(places, axis=0)[0]), axis=1).max() < 2e-6
+
+
 def test_moves_one_after_the_other():
     moves = [
         line(TO),

@@ -60,7 +60,7 @@ class StoppingLaws:
         return self._laws.along(course, index, (0.0, course.length), self.ends(chain, index), 1.0)
 
     def ends(self, chain: FlyByChain, index: int) -> Array:
-        """Return the states of that motion at the start and at the end, (2, 2): as fast as its pace asks for."""
+        """Return the states of that motion at the start and at the end, (2, 2), before it is slowed down."""
         start = np.zeros(2) if index else chain.ends[0] / self._pace(chain, 0) ** np.arange(1, 3)
         return np.stack([start, np.zeros(2)])
 

@@ -262,16 +262,10 @@ def _rates_along(course: Course, start: State) -> Array:
     from trajcli.planners.point_to_point.jerk_limited import rate_along
 
     first, bend = course.curve.evaluate_orders(np.zeros(1), (1, 2))[0]
-    speed = rate_along(first, start.velocity, 1, course.robot)
-    bent = start.acceleration - speed**2 * bend
-    if not bend.any() or np.isinf(course.robot.limits.jerk).all():  # then the acceleration may step
-        bent = start.acceleration
-    try:
-        return np.array([speed, rate_along(first, bent, 2, course.robot)])
-    except PlanningError:
-        if bent is start.acceleration:
-            raise
-        raise PlanningError("its path bends where the joints start without that acceleration") from None
+    if bend.any() and np.isfinite(course.robot.limits.jerk).any():
+        raise PlanningError("its path bends where the joints start in motion")
+    rates = (start.velocity, 1), (start.acceleration, 2)
+    return np.array([rate_along(first, values, order, course.robot) for values, order in rates])
 
 
 def _within_limits(

@@ -38,6 +38,7 @@ from trajcli.kinematics.inverse.target import (
     partial_target,
     residuals,
 )
+from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.numbers import FieldPath, Flaw, Model, Number
 from trajcli.language.poses import Configuration
@@ -270,7 +271,9 @@ def _about_target(error: PlanningError, planned: PlannedPath, robot: Robot) -> P
         return PlanningError(*error.problems)
     missed = ~solve(robot, planned.path.at_s(s, "left").target(), None).valid.any(axis=-1)
     field = planned.targets[int(missed.argmax())][0] if missed.any() else None
-    return PlanningError(*(replace(problem, field=field) for problem in error.problems))
+    by_place = planned.arrival is not None and len(robot.joints) < _ALL_SIX
+    also = ", or give the target by `xyz` alone" * by_place
+    return PlanningError(*(replace(each, field=field, hint=f"{each.hint}{also}") for each in error.problems))
 
 
 def _wanted_speed(law: LawSpec, limits: ToolLimits, path: ToolPath) -> float | None:
@@ -367,7 +370,8 @@ def tool_target(target: Target, before: Array, robot: Robot) -> ToolTarget:
     """
     if target.joints is not None:
         joints = np.array(target.joints)
-        return ToolTarget(forward(robot, joints), _WHOLE, "all", joints=joints)
+        decided = np.linalg.matrix_rank(jacobian(robot, joints)[:3]) == joints.size  # by the place alone
+        return ToolTarget(forward(robot, joints), _WHOLE, "none" if decided else "all", joints=joints)
     goal = ik_target(target)
     position = goal.poses[:3, 3] if target.gives_position else before[:3, 3]
     if goal.orientation == "none":
