@@ -13,7 +13,8 @@ _PATHS = """\
 `line`, `arc`, `path` and `screw` lead the tcp along a path in space; the joints follow. They start and end
 at rest. A target is a pose or the name of a point; without `xyz` the tool stays where it is and turns, and
 without an orientation it keeps the one it has (an arm with fewer than six joints leaves it free). Joint
-values may be a target too: the pose that belongs to them. What a target fixes holds along the whole path: a
+values may be a target too: the pose that belongs to them, or its place where that decides them all, as in an
+arm with two joints. What a target fixes holds along the whole path: a
 target with `yaw` alone fixes nothing but the yaw along the path.
 
 The arm stays on the branch on which it starts, and arrives there: another `configuration` in the target is

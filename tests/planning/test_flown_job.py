@@ -190,7 +190,7 @@ def test_a_start_in_motion_is_kept_where_a_chain_would_have_to_be_stretched() ->
     assert 100 * aligned.trajectory.duration == pytest.approx(round(100 * aligned.trajectory.duration))
     (event,) = aligned.events
     assert event.kind == "not_faster"
-    assert "begins at a speed" in event.message
+    assert "begins in motion" in event.message
 
 
 def test_a_path_that_bends_where_the_arm_moves_already_is_left_to_the_move_that_stops() -> None:

@@ -176,8 +176,8 @@ class ToolConstraint:
 class ToolJerkConstraint:
     """Limits of the jerk of the tool along a path, of its size in space.
 
-    Each is kept in the direction of the jerk of the law at hand, which is exact about it, in 15 more of
-    the plane of both this and the path, and square to it: a box would let the law jump from corner to corner.
+    Each is kept in the direction of the jerk of the law at hand, in 15 more of the plane of both this and
+    the path, and square to it: a box would let the law jump from corner to corner.
 
     Attributes:
         path: Of the tool.
@@ -243,12 +243,9 @@ def _samples_of(law: LawPieces, length: float, count: int) -> tuple[list[Array],
 
 def _used(velocity: Array, acceleration: Array, speeds: tuple[Array, Array], limits: ToolLimits) -> Array:
     """Return the shares of speed and acceleration (2, N) that twists and their derivatives (N, 6) use."""
-    shares = []
-    most = np.array([limits.acceleration, limits.angular_acceleration])
-    for rows, bounds in ((velocity, np.stack(speeds, axis=1)), (acceleration, most)):
-        lengths = np.linalg.norm(rows.reshape(-1, 2, 3), axis=2)
-        shares.append((lengths / bounds).max(axis=1))
-    return np.stack(shares)
+    rows = np.stack([velocity, acceleration]).reshape(2, -1, 2, 3)
+    most = np.full((len(velocity), 2), [limits.acceleration, limits.angular_acceleration])
+    return np.asarray((np.linalg.norm(rows, axis=3) / [np.stack(speeds, axis=1), most]).max(axis=2))
 
 
 def _across(along: Array, curvature: Array) -> Array:

@@ -145,8 +145,8 @@ class PathPart:
         if self.typical:
             _leave_room(limits, before, after)
         ends, steps = np.hstack([before, after]), np.full(len(before), self.length)
-        least = steps / ends[:, ::2].max(axis=1, initial=self.bounds[1])  # whatever room is left
-        found = np.maximum(fastest_durations(steps, ends, limits), least)
+        least = steps / ends[:, ::2].max(axis=1, initial=self.bounds[1])
+        found: Array = np.maximum(fastest_durations(steps, ends, limits), least)
         return found.reshape(len(first), len(last))
 
 

@@ -286,15 +286,11 @@ def _phases(parts: Sequence[MoveInterval]) -> Iterator[Phase]:
 
 
 def stretched_chain(chain: FlownChain, factor: float) -> FlownChain:
-    """Return the chain that lasts `factor` times longer.
-
-    Raises:
-        PlanningError: When it begins in motion.
-    """
+    """Return the chain that lasts `factor` times longer; refuse one that begins in motion."""
     if factor == 1:
         return chain
     if chain.chain.ends[0].any():
-        raise PlanningError("a motion that begins at a speed cannot be stretched")
+        raise PlanningError("what begins in motion cannot be stretched")
     parts = tuple(
         FlownPart(
             scale_time(part.curve, factor),

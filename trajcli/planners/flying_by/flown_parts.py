@@ -109,10 +109,7 @@ class CourseLaws:
 def _law_between(
     course: Course, index: int, stretch: tuple[float, float], states: Array, tempo: float
 ) -> FlownPart | NoLawError:
-    """Return the fastest motion that is found between two states along a path, or why there is none.
-
-    Where the joints go straight, limits of the tool bound one variable, and often hardly change.
-    """
+    """Return the fastest motion that is found between two states along a path, or why there is none."""
     simple, close = _within_tightest(course, index, stretch, states, tempo)
     if simple is not None and close:
         return simple
@@ -250,10 +247,7 @@ def _between(curve: PiecewisePolynomial, low: float, high: float) -> PiecewisePo
 
 
 def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> FlownPart:
-    """Return the motion of all joints, each (n, 3) by position, velocity and acceleration, through a zone.
-
-    What hardly moves follows a quintic: its numbers are what other curves leave of rounding.
-    """
+    """Return the motion of all joints, each (n, 3), through a zone; what hardly moves follows a quintic."""
     problems = [
         BoundaryProblem(name, tuple(first), tuple(last), bound.reshape(3, 2))
         for name, first, last, bound in zip(names, ends[0].tolist(), ends[1].tolist(), bounds, strict=True)
@@ -278,10 +272,7 @@ def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> Flow
 
 
 def _slow_quintics(problems: Sequence[BoundaryProblem]) -> list[PiecewisePolynomial] | None:
-    """Return quintics of one duration, somewhat longer than needed, that keep all bounds; None without any.
-
-    They lead from rest to next to rest, where numbers are too small for phases of constant jerk.
-    """
+    """Return quintics of one duration within all bounds, where numbers are too small for constant jerks."""
     longest = max(_least_duration(problem) for problem in problems)
     for longer in _LONGER:
         curves = [_quintic(problem, longer * longest) for problem in problems]

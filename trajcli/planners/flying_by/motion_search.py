@@ -158,10 +158,7 @@ class MotionSearch:
         return 2 * index - (s is None or s - first <= last - s)
 
     def _calmed(self, calm: set[int], row: ChainRow, states: Array) -> FoundStates:
-        """Return states with less acceleration and speed at some nodes; on the other side of zones new ones.
-
-        Those at the start and at the end of the chain stay as they are.
-        """
+        """Return states with less acceleration and speed at some nodes, and new ones across zones."""
         states = states.copy()
         states[[node + 1 for node in calm]] *= _CALM
         free = {node ^ 1 for node in calm} - calm
@@ -261,11 +258,7 @@ class MotionSearch:
         return bool((lowered < shares).any())
 
     def _kept_shares(self, findings: Sequence[Finding], used: Array) -> Array:
-        """Return by what to lower velocity, acceleration and jerk of the joints, (3,), to keep limits.
-
-        A speed of the tool goes with those of the joints, its acceleration and jerk nearly so; what joints
-        do not use (3,) is no help.
-        """
+        """Return by what to lower velocity, acceleration and jerk of the joints, of which they use (3,)."""
         shares = np.ones(3)
         for finding in findings:
             order = _ORDERS.get(finding.kind) if self._by_order else None

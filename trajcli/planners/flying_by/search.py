@@ -115,10 +115,7 @@ class ChainSearch:
     def _round(
         self, before: FoundStates, low: int, size: float, number: int, step: Array | None
     ) -> FoundStates:
-        """Return the fastest chain among grids around the states of a window that begins at a node.
-
-        The step that its states have made in the round before is made again, too, and further.
-        """
+        """Return the fastest chain among grids around the states of a window, and along its last step."""
         states, high = before.states, low + len(before.durations)
         nodes, parts = self.nodes[low : high - 1], self.parts[low:high]
         inner = [
@@ -178,10 +175,7 @@ def begin_search(
 
 
 def _by_windows(grids: list[Array], nodes: Sequence[BorderNode], parts: Sequence[ChainPart]) -> FoundStates:
-    """Return a fast chain whose nodes have states of their grids: window by window, each with an open end.
-
-    What comes behind a window hardly counts for its first moves; the last ones are found again with the next.
-    """
+    """Return a fast chain whose nodes have states of their grids: window by window, each with an open end."""
     states, durations = grids[0], list[float]()
     for low, high in _windows(len(parts), _AT_FIRST):
         some = [states[low : low + 1], *grids[low + 1 : high + 1]]
@@ -207,8 +201,7 @@ def _completed(
 def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart], known: float = math.inf) -> FoundStates:
     """Return the fastest chain whose nodes have states of their grids, if it lasts less than is `known`.
 
-    What the slowest joint needs in a zone bounds what all need together from below. That is looked up for the
-    zones of the best chain alone, until the best chain has no zone left for which it is not known.
+    What all joints need together in a zone is looked up for those of the best chain alone.
     """
     pairs = list(zip(grids[:-1], grids[1:], parts, strict=True))
     costs = _costs(pairs, known)
@@ -234,11 +227,9 @@ def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart], known: float = 
 
 
 def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], known: float) -> list[Array]:
-    """Return durations of parts between states of grids, (p, q) each, those of zones from below.
+    """Return durations of parts between states of grids, (p, q) each: in zones what the slowest joint needs.
 
-    They are what the slowest joint needs by itself. The joints of a zone come one after another, those first
-    that are slow between the first states; pairs of states through which no chain is faster than is `known`
-    are left out.
+    The joints come one after another; pairs through which no chain is faster than is `known` are left out.
     """
     zones = [
         part.between(before, after) if isinstance(part, ZonePart) else None for before, after, part in pairs

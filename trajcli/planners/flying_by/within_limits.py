@@ -1,12 +1,10 @@
 """Chains that are as fast as is found, and keep all limits.
 
-Where a part of the motion is over a limit, its pace alone is lowered until it is not: with time scaled by f,
-velocities go with f, accelerations with f^2, jerks with f^3. Where the tool is over a limit in a zone, that
-derivative of the joints alone is lowered, or the pace, whichever is faster. Where it leaves its zone, smaller
-borders are tried, then a slower pace.
+Where a part of the motion is over a limit, its pace alone is lowered until it is not. Where the tool is over
+a limit in a zone, that derivative of the joints alone is lowered, or the pace, whichever is faster. Where it
+leaves its zone, smaller borders are tried, then a slower pace.
 
-Lines in joint space that go on in the same direction under the same limits are one: no motion of the slowest
-joint is faster than one law.
+Lines in joint space that go on in the same direction under the same limits are one.
 """
 
 from __future__ import annotations

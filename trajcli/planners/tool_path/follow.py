@@ -71,8 +71,7 @@ class FollowingDiagnosis:
 
     def stuck(self, error: StuckError) -> PlanningError:
         """Return the error of an arm that could not be followed beyond some s."""
-        unreachable = self._unreachable(error.s)
-        return unreachable or self._singular(error.s, error.joints, error.rates)
+        return self._unreachable(error.s) or self._singular(error.s, error.joints, error.rates)
 
     def unfit(self, at: float, guess: Callable[[Array], Array], most: int) -> PlanningError:
         """Return the error of joints that no curve of so many pieces follows around some s or time."""
@@ -281,12 +280,10 @@ class FollowedPath:
         Where the tcp goes is known without the joints, which are found anew at each s for the turn alone.
         """
         speeds = self.path.speeds
-        turning = [
-            tcp.angular_speed,
-            tcp.angular_acceleration,
-            *([] if speeds is None else speeds.angular_speed),
-        ]
-        return self.executed if np.isfinite(turning).any() else self.path
+        turning = min(tcp.angular_speed, tcp.angular_acceleration)
+        if speeds is not None:
+            turning = min(turning, speeds.angular_speed.min())
+        return self.executed if turning < np.inf else self.path
 
     @contextmanager
     def diagnosed(self) -> Iterator[None]:

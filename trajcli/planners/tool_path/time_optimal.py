@@ -93,8 +93,8 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
         for b in binding
     ]
     events = _events(solved, robot, remaining, fastest=factor == remaining)
-    joint_constraint = JointConstraint(curve, limits.velocity, limits.acceleration)
-    constraints = (joint_constraint, *further, *effort_constraints(curve, robot))
+    of_joints = JointConstraint(curve, limits.velocity, limits.acceleration)
+    constraints = (of_joints, *further, *effort_constraints(curve, robot))
     breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
     dimension: Literal["length", "angle"] = "angle" if path.poses.pure_rotation else "length"
     plane = PhasePlane(law, constraints, breaks, solved.stops, dimension)
@@ -193,10 +193,8 @@ def limits_of_law(spec: LawSpec, limits: ToolLimits, speeds: SpeedLimits | None 
         limits: Of the tool.
         speeds: Where they step along the path; the highest count.
     """
-    given = spec.model_dump(
-        include={"speed", "acceleration", "jerk", "angular_speed", "angular_acceleration"}
-    )
-    tcp = ToolLimits(**{**vars(limits), **{name: v for name, v in given.items() if v is not None}})
+    given = spec.model_dump(include=set(vars(limits)), exclude_none=True)
+    tcp = replace(limits, **given)
     if speeds is None:
         return tcp
     return replace(tcp, speed=float(speeds.speed.max()), angular_speed=float(speeds.angular_speed.max()))
