@@ -3,7 +3,7 @@
 A chain is a row of nodes, each with the speed and the acceleration of a law; between two of them lies a part
 of a path, on which one variable is fastest, or a zone, through which each joint is. Dynamic programming over
 a grid of states at every node finds the basin; grids around the best chain, turned from round to round, and
-smaller where they gain nothing, lead to its ground. Each is exact among its states, and no round is slower.
+smaller where they gain nothing, lead to its ground.
 
 Source: Bellman (1957); Torczon, On the convergence of pattern search algorithms, SIAM Journal on Optimization
 7(1), 1997.
