@@ -160,10 +160,8 @@ class ToolPathMove(Planner):
     @property
     def why_not_flown_by(self) -> str | None:
         """Why no motion can fly by a corner of this move; None where it can."""
-        for name in ("duration", "minimum_duration"):
-            if getattr(self.law, name) is not None:
-                return f"its law has a `{name}`"
-        return None
+        given = [name for name in ("duration", "minimum_duration") if getattr(self.law, name) is not None]
+        return f"its law has a `{given[0]}`" if given else None
 
     def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
         """Return the joints along the path, from joint values (n,).
@@ -230,8 +228,8 @@ class ToolPathMove(Planner):
             joints = self._followed(planned, start.position, robot)
         except UnreachablePathError as error:
             raise _about_target(error, planned, robot) from None
-        room = max(self.tolerance.position, self.tolerance.angle)
-        diagnosis_of_motion(robot, joints.motion).refuse_limits(joints.curve, room)
+        diagnosis = diagnosis_of_motion(robot, joints.motion)
+        diagnosis.refuse_limits(joints.curve, max(self.tolerance.position, self.tolerance.angle))
         end = joints.curve.piece_ends()[1][-1]
         check_arrival(planned, end, robot)
         return Planned(
@@ -395,10 +393,8 @@ def _refuse_upright(goal: IkTarget, before: Array) -> None:
     axis = before[:3, AXES.index(goal.tool_axis)]
     if np.hypot(axis[0], axis[1]) <= _UPRIGHT:
         message = f"the {goal.tool_axis} axis of the tool is upright where the move starts: it has no heading"
-        raise PlanningError(
-            message,
-            hint=f"say another `tool_axis`, or give the target's orientation without {goal.orientation}",
-        )
+        hint = f"say another `tool_axis`, or give the target's orientation without {goal.orientation}"
+        raise PlanningError(message, hint=hint)
 
 
 def _typed(target: Target) -> tuple[Array, str, str] | None:
