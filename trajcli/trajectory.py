@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, numeric, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
-from trajcli.grids import AT_BREAK, UniformGrid, onto_breaks
+from trajcli.grids import AT_BREAK, NANOSECOND, UniformGrid, onto_breaks
 from trajcli.kinematics.robot import JointType, MountedTool, Payload, Robot
 
 if TYPE_CHECKING:
@@ -263,8 +263,8 @@ class Signal:
     changes: tuple[SignalChange, ...]
 
     def values(self, times: Array) -> Array:
-        """Return its values at times (N,) from the start of the trajectory: at a change the new one."""
-        after = np.searchsorted([change.time for change in self.changes], times + AT_BREAK, "right")
+        """Return its values at times (N,) from the start: at a change, to a nanosecond, the new one."""
+        after = np.searchsorted([change.time for change in self.changes], times + NANOSECOND, "right")
         return np.array([0.0, *(change.value for change in self.changes)])[after]
 
 

@@ -18,6 +18,7 @@ from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.forward import forward
 from trajcli.output.report import report_of
+from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
 
@@ -139,6 +140,21 @@ def test_a_row_at_the_very_time_has_the_new_value_and_before_the_first_it_is_0()
     times = np.array([0.0, first - 1e-6, first, second - 1e-6, second, plan.trajectory.duration])
     (rows,) = sample(plan.trajectory, ListedGrid(plan.trajectory.duration, times), ("t", "signals"))
     assert rows[:, 1].tolist() == [0, 0, 3, 3, 2, 2]
+
+
+@pytest.mark.parametrize("distance", few([30.0, 40.0, 55.0, 70.0, 90.0, 120.0], 2))
+def test_the_row_of_a_knot_at_the_time_of_a_signal_has_its_value(distance: float) -> None:
+    """A knot stands at the nearest nanosecond, which may be before the break at which the signal is set."""
+    moves = [
+        part
+        for k in range(1, 9)
+        for part in (line(0, 0, distance + k), {"signal": "s", "value": k}, line(0, 0, -distance))
+    ]
+    plan = planned(*moves, output={"rows": "knots", "columns": ["t", "q", "qd", "qdd", "signals"]})
+    rows = np.concatenate(list(sample(plan.trajectory, grid_of(plan), ("t", "signals"))))
+    for value, time in enumerate(times_of(plan), 1):
+        near = np.abs(rows[:, 0] - time) < 0.6e-9
+        assert rows[near, 1].tolist() == [value] * near.sum()
 
 
 def test_slowed_moves_set_their_signals_where_they_did() -> None:

@@ -53,7 +53,10 @@ class PeakReport(ReportPart):
     limit: Annotated[
         tuple[float | None, float | None], MeasuredIn(), described("Bounds, SI; null is unlimited.")
     ]
-    used: Annotated[float | None, described("Largest part of the bound that is used; null if unlimited.")]
+    used: Annotated[
+        float | None,
+        described("Largest part of the bound that is used, of positions from mid-range; null if unlimited."),
+    ]
     unit: UnitName
 
 

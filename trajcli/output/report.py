@@ -223,8 +223,11 @@ def _contradictions(plan: Plan, moves: Sequence[MoveReport]) -> list[Finding]:
 def _peak(move: PlannedMove, joint: int, order: int, peaks: Peaks) -> PeakReport:
     low, high = float(peaks.low[joint]), float(peaks.high[joint])
     below, above = (float(bound) for bound in move.robot.limits.of_order(order)[joint])
+    zero = 0.0 if order else (below + above) / 2  # a range of positions need not hold 0
     parts = [
-        value / bound for value, bound in ((low, below), (high, above)) if math.isfinite(bound) and bound
+        (value - zero) / (bound - zero)
+        for value, bound in ((low, below), (high, above))
+        if math.isfinite(bound - zero) and bound != zero
     ]
     return PeakReport(
         joint=move.robot.joint_names[joint],

@@ -55,9 +55,9 @@ def causes_of(plan: Plan) -> tuple[Cause, ...]:
 def _cause(finding: Finding, units: str | None) -> tuple[float | str | None, ...]:
     """Return what findings of one cause share.
 
-    That is: numbers in other units than were meant; a point outside its limit, from which several moves come
-    and go; a move that is too short, for whatever limit; steps of the acceleration, where its derivative
-    has no bound, so that the limit of jerk is broken, too; else the move and the kind.
+    That is: numbers in other units than were meant; a point outside its limit, of several moves; a move that
+    is too short, for whatever limit; steps of the acceleration, which break that of jerk, too; else the move
+    and the kind.
     """
     if finding.kind in QUANTITIES and finding.hint is not None and finding.hint == units:
         return (finding.hint,)
@@ -71,10 +71,10 @@ def _cause(finding: Finding, units: str | None) -> tuple[float | str | None, ...
 
 
 def badness(finding: Finding) -> tuple[float, float, float]:
-    """Return how bad a finding is, for comparisons of those of one cause.
+    """Return how bad a finding is, to compare those of one cause.
 
-    Positions and steps come first; then what asks for the longest motion; then how far the value is beyond
-    its limit: of positions the distance, else the part of the limit.
+    Positions and steps come first; then what asks for the longest motion, or is furthest beyond its limit: of
+    positions by distance, else by the part of the limit.
     """
     first = math.inf if finding.kind in ("position", "acceleration_jump") else 0.0
     if finding.kind == "position" or not finding.limit:
@@ -111,10 +111,11 @@ def _number(loaded: LoadedJob, finding: Finding) -> Place | None:
 
 
 def _targets(loaded: LoadedJob, move: int) -> Iterator[tuple[str | int, ...]]:
-    """Yield the paths of the targets of a move, those on its way first; of a name that of its point."""
+    """Yield the paths of the targets of a move, then of its start; of a name that of its point."""
     through = loaded.document.node(("moves", move, "through"))
     count = len(through.value) if through is not None and isinstance(through.value, list) else 0
-    for path in [*(("moves", move, "through", k) for k in range(count)), ("moves", move, "to")]:
+    on_way = (("moves", move, "through", k) for k in range(count))
+    for path in [*on_way, ("moves", move, "to"), ("moves", max(move - 1, 0), "to")]:
         node = loaded.document.node(path)
         name = None if node is None else node.value
         yield ("points", name) if isinstance(name, str) and name in loaded.job.points else path

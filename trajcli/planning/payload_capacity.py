@@ -1,8 +1,7 @@
 """Payload capacity: the largest mass with which a job still verifies, and what binds there.
 
-At each instant of a motion every effort is affine in the mass that the tool carries, so that the rows of a
-plan say nearly which mass brings the first of them to its limit. The proof of all instants, and what depends
-on the mass in the planning itself, are met by halving the bracket around it, by the job's own verdict.
+At each instant every effort is affine in the mass that is carried, so that rows of a plan nearly say which
+mass brings one to its limit. The bracket around it is halved by the job's own verdict.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from trajcli.progress import progress_of
 PlanWith = Callable[[LoadedJob, Carried], Plan]
 """Returns the plan of a job with what the tool carries in a move instead."""
 LARGEST = 1e6
-"""What no arm carries, kg: a job that verifies with it has no largest payload."""
+"""What no arm carries, kg."""
 _CLOSE = 1e-10  # relative: width at which a bracket is closed
 _GUESS = 1e-4  # relative: how near the rows of a plan come to its mass
 _EACH = 64  # rows of a piece
@@ -171,8 +170,8 @@ class _Search:
     def bracket_of_stops(self) -> tuple[float, float | None] | None:
         """Return the bracket of the job with stops, where both its ends hold for the one that flies, too.
 
-        Motions through zones are slowed until they keep efforts, and else the arm stops: what it can carry is
-        what it can carry with stops, as a rule, which is looked for in a fraction of the time.
+        Motions through zones are slowed until they keep efforts: as a rule the arm carries what it can with
+        stops, which is found in a fraction of the time.
         """
         if not self._loaded.job.names_zones:
             return None
@@ -209,8 +208,8 @@ class _Search:
     def closed(self, low: float, high: float) -> tuple[float, float]:
         """Return the bracket as narrow as it gets.
 
-        Where the motion is the same at both ends it is so between them: only its efforts change. Else masses
-        are tried beside the one where the line through what two too large ones take meets the limit.
+        Where the motion is the same at both ends only its efforts change between them. Else masses are tried
+        beside the one where the line through what two too large ones take meets the limit.
         """
         below, above = self.attempt(low), self.attempt(high)
         motion = below if _same_motion(below, above) else None

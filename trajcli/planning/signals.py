@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from trajcli.planners.planner import PlannedMove
     from trajcli.planning.flown_job import FlyBy
 
-_ROUNDING = 1e-9  # of a path's length: by so little one that is written may be off
+_ROUNDING = 1e-9  # of a path's length: by which one that is written may be off
 _NEAR = 65  # times at which a distance is looked at
 _CLOSER = 7  # times that its smallest value is enclosed anew, each time 32 times closer
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import struct
 import tracemalloc
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from streams.mcap.conftest import plan_of, read_mcap, write_log
+from tiers import few
 
 from trajcli.errors import InputError
 from trajcli.knots import knots_of
@@ -116,6 +119,12 @@ def test_times_of_a_clock_count_from_the_first(tmp_path: Path) -> None:
     assert motion.times.tolist() == [0.0, 0.01, 0.02]
 
 
+def _none() -> Any:
+    from mcap.writer import CompressionType
+
+    return CompressionType.NONE
+
+
 def raw_messages(path: Path, times: list[int], channels: int, **options: object) -> Path:
     """Write states by turns into several channels of one topic."""
     from mcap.writer import Writer
@@ -145,6 +154,14 @@ def test_one_stamp_of_zero_does_not_make_the_recorder_count(start: int, tmp_path
     assert read_mcap(path).times.tolist() == [0.0, 0.01, 0.02]
 
 
+@pytest.mark.parametrize("chunked", [True, False])
+def test_stamps_of_any_of_the_channels_of_a_topic_count(chunked: bool, tmp_path: Path) -> None:
+    times = [0, 5 * 10**7, 0, 6 * 10**7]
+    for by_turns in (times, times[::-1]):
+        path = raw_messages(tmp_path / "a.mcap", by_turns, 2, use_chunking=chunked)
+        assert read_mcap(path).times.tolist() == [time / 1e9 for time in by_turns]
+
+
 def test_channels_of_one_topic_are_read_in_the_order_of_their_messages(tmp_path: Path) -> None:
     times = [k * 10**7 for k in range(30)]
     motion = read_mcap(raw_messages(tmp_path / "a.mcap", times, 3))
@@ -170,6 +187,71 @@ def test_an_index_that_ends_early_is_one_error(tmp_path: Path) -> None:
         at += 9 + length
     (tmp_path / "b.mcap").write_bytes(out + data[-8:])
     assert "a record is damaged" in refused(tmp_path / "b.mcap")
+
+
+@pytest.mark.parametrize("sized", [True, False])
+@pytest.mark.parametrize("frames", [1, 2, 5])
+def test_a_chunk_of_several_frames_is_read(frames: int, sized: bool, tmp_path: Path) -> None:
+    """As a writer makes it that flushes its compressor now and then, with or without the size in its frames."""
+    import zstandard
+
+    times = [k * 10**7 for k in range(20)]
+    data = raw_messages(tmp_path / "a.mcap", times, 1, compression=_none()).read_bytes()
+    at, out = 8, data[:8]
+    while data[at] not in (15, 7):  # the end of the data, or an index
+        kind, length = struct.unpack_from("<BQ", data, at)
+        content = data[at + 9 : at + 9 + length]
+        if kind == 6:
+            packer, plain = zstandard.ZstdCompressor(write_content_size=sized), content[40:]
+            cuts = np.linspace(0, len(plain), frames + 1).astype(int).tolist()
+            packed = b"".join(packer.compress(plain[a:b]) for a, b in pairwise(cuts))
+            content = content[:28] + struct.pack("<I4sQ", 4, b"zstd", len(packed)) + packed
+        out += struct.pack("<BQ", kind, len(content)) + content
+        at += 9 + length
+    (tmp_path / "b.mcap").write_bytes(out + struct.pack("<BQQQI", 2, 20, 0, 0, 0) + data[:8])
+    assert read_mcap(tmp_path / "b.mcap").times.tolist() == [time / 1e9 for time in times]
+
+
+@pytest.mark.parametrize("size", few(range(31), 6))
+def test_a_message_that_ends_in_its_head_is_one_error(size: int, tmp_path: Path) -> None:
+    """In no chunk, whose walk would see it; behind whole ones, or the only one."""
+    short = struct.pack("<BQHIQQ", 5, max(size - 9, 0), 1, 0, 0, 0)[: max(size, 9)]
+    for stamps in ([], [0, 10**7]):
+        data = raw_messages(tmp_path / "a.mcap", stamps, 1, use_chunking=False).read_bytes()
+        at = data.index(struct.pack("<BQI", 15, 4, 0)[:9])  # the end of the data
+        end = struct.pack("<BQQQI", 2, 20, 0, 0, 0) + data[:8]  # and no summary
+        (tmp_path / "b.mcap").write_bytes(data[:at] + short + end)
+        assert "damaged" in refused(tmp_path / "b.mcap")
+
+
+def test_a_chunk_that_claims_more_bytes_than_there_can_be_is_one_error(tmp_path: Path) -> None:
+    data = bytearray(raw_messages(tmp_path / "a.mcap", [0, 10**7], 1, compression=_none()).read_bytes())
+    (tmp_path / "b.mcap").write_bytes(data)
+    read_mcap(tmp_path / "b.mcap")
+    at = 8
+    while data[at] != 6:
+        at += 9 + struct.unpack_from("<Q", data, at + 1)[0]
+    struct.pack_into("<Q", data, at + 9 + 8 + 8 + 8 + 4 + 4, 2**63)  # behind an empty name of a compression
+    (tmp_path / "b.mcap").write_bytes(data)
+    assert "a record is damaged (OverflowError)" in refused(tmp_path / "b.mcap")
+
+
+@pytest.mark.parametrize("epoch", ["²", "9" * 5000, str(2**63), str(2**64), "9" * 19, "soon", "-5"])
+def test_an_epoch_that_is_no_time_of_a_log_is_none(epoch: str, tmp_path: Path) -> None:
+    """Metadata under our name may be anybody's: times count as in any other log."""
+    from mcap.writer import Writer
+    from mcap_ros2._dynamic import serialize_dynamic
+
+    encode = serialize_dynamic(STATE, definition_of(STATE))[STATE]
+    with (tmp_path / "a.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "somebody")
+        schema = writer.register_schema(STATE, "ros2msg", definition_of(STATE).encode())
+        channel = writer.register_channel("/x", "cdr", schema)
+        writer.add_message(channel, 0, bytes(encode(state(2 * 10**9, [1.0, 2.0, 3.0]))), 0)
+        writer.add_metadata("trajcli", {"epoch": epoch})
+        writer.finish()
+    assert read_mcap(tmp_path / "a.mcap").times.tolist() == [2.0]
 
 
 def test_a_trajectory_without_points_is_one_error(tmp_path: Path) -> None:

@@ -1,9 +1,8 @@
 """Common Data Representation of messages of one length, as arrays of structures.
 
-All strings and counts of a message are known before its numbers are: so every message of a topic has the
-same bytes but for its numbers, and these stand at fixed offsets. The bytes begin with the four of the
-encapsulation (little endian), and alignment counts from behind them. A sequence is its count and then its
-elements; an empty one has no padding behind its count.
+All messages of a topic have the same strings and counts, and numbers at fixed offsets. Alignment counts from
+behind the four bytes of the encapsulation (little endian). A sequence is its count and then its elements; an
+empty one has no padding behind its count.
 
 Source: OMG, DDS-XTypes 1.3, section 7.4.3.5 (encoding version 1), as ROS 2 uses it.
 """

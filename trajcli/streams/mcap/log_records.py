@@ -196,7 +196,7 @@ class LogRecords:
 
         try:
             yield
-        except (McapError, struct.error, ValueError, IndexError) as error:
+        except (McapError, struct.error, ValueError, IndexError, OverflowError) as error:
             raise self.wrong(f"a record is damaged ({type(error).__name__})") from error
 
     def _note(self, kind: int, content: bytes, checksum: int) -> None:
@@ -230,8 +230,8 @@ class LogRecords:
 
     def _single(self, record: bytes) -> tuple[Bytes, dict[int, NDArray[np.int64]]]:
         """Return a message that stands in no chunk."""
-        (channel,) = struct.unpack_from("<H", record, records.RECORD_HEAD.size)
-        return np.frombuffer(record, np.uint8), {channel: np.zeros(1, np.int64)}
+        head = np.frombuffer(record, _HEAD, 1)
+        return np.frombuffer(record, np.uint8), {int(head["channel"][0]): np.zeros(1, np.int64)}
 
     def _block(self, chunk: Any, index: dict[int, NDArray[np.int64]]) -> MessageBlock:  # noqa: ANN401
         data = self._unpacked(chunk)
@@ -264,10 +264,8 @@ class LogRecords:
             if chunk.compression == "zstd":
                 import zstandard
 
-                decompressor = zstandard.ZstdDecompressor()
-                if zstandard.get_frame_parameters(chunk.data).content_size == most - 1:
-                    return decompressor.decompress(chunk.data)
-                return decompressor.stream_reader(chunk.data).read(most)
+                reader = zstandard.ZstdDecompressor().stream_reader(chunk.data, read_across_frames=True)
+                return reader.read(most)
             if chunk.compression == "lz4":
                 import lz4.frame
 

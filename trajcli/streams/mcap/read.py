@@ -32,6 +32,7 @@ METADATA = "trajcli"
 _READ = (definitions.JOINT_STATE, definitions.JOINT_TRAJECTORY, definitions.CONTROLLER_STATE)
 _ARRAYS = ("times", "position", "velocity", "acceleration", "effort")  # of a motion
 _Layout = Callable[[bytes], StateLayout] | None
+_LATEST = 2**62  # ns: no epoch of ours is later
 _CLOCK = 10**17  # ns: stamps from here on (1973) are times of a clock, and counted from the first
 
 
@@ -263,7 +264,7 @@ class _Clock:
     """The start of the times of a log, ns, which is found with the first stamp."""
 
     def __init__(self, own: Mapping[str, str]) -> None:
-        self._epoch = own.get("epoch", "")
+        self._epoch = own.get("epoch", "")[:20]
         self.start: int | None = None
 
     def seconds(self, stamps: NDArray[np.int64]) -> Array:
@@ -271,7 +272,7 @@ class _Clock:
         if self.start is None:
             first = int(stamps[0])
             self.start = first if first >= _CLOCK else 0
-            if self._epoch.isdigit():
+            if self._epoch.isdecimal() and int(self._epoch) < _LATEST:
                 self.start = int(self._epoch)
         return np.asarray((stamps - self.start) / 1e9)
 

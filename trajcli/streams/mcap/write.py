@@ -1,7 +1,7 @@
 """Writing of MCAP: chunks that hold all topics of an interval in order of time, with indices and checksums.
 
-The numbers of a block of rows are put into the templates of its records at once: no message is made alone.
-Nothing in a file depends on when or where it was written.
+The numbers of a block of rows are put into the templates of its records at once. Nothing in a file depends
+on when or where it was written.
 """
 
 from __future__ import annotations

@@ -1,0 +1,141 @@
+"""The largest payload of two links in a vertical plane, against their torques in closed form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from planning.test_payload_capacity import CARRYING, EMPTY, FREE, HEAD, LAST, verifies
+from tiers import few
+
+from trajcli.errors import InputError, TrajcliError
+from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.planning.payload_capacity import Carried, PayloadCapacity, payload_capacity
+from trajcli.planning.plan import Plan, plan_job
+
+G = 9.81
+
+
+def held(pose: Sequence[float], limits: str, attached: str, at: int | None = None) -> PayloadCapacity:
+    """Return the capacity of an arm that stands."""
+    text = f"{HEAD}\nlimits: {{effort: {limits}}}\nstart: {{joints: {list(pose)}}}\n"
+    return payload_capacity(
+        job_from_text(f"{text}moves:\n{attached}  - {{planner: hold, duration: 1}}\n"), at
+    )
+
+
+def torques(pose: Sequence[float], com: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return what holds the links, and what holds one kilogram more, N m."""
+    first, both = np.radians([pose[0], pose[0] + pose[1]])
+    elbow = 0.5 * np.cos(first)
+    place = elbow + (0.4 + com[0]) * np.cos(both) - com[1] * np.sin(both)
+    own = 2 * (elbow + 0.2 * np.cos(both)), 2 * 0.2 * np.cos(both)
+    return G * np.array([own[0] + 4 * 0.25 * np.cos(first), own[1]]), G * np.array([place, place - elbow])
+
+
+@pytest.mark.parametrize("com", few([(0.06, 0.02), (0.0, 0.3), (-0.2, 0.0)], 2))
+@pytest.mark.parametrize("pose", [(0, 20), (180, -20), (60, 80), (-120, -50)])
+def test_of_an_arm_that_stands(pose: Sequence[float], com: Sequence[float]) -> None:
+    """Limits differ by direction, and the joint that binds by the pose."""
+    low, high = np.array([-70.0, -20.0]), np.array([90.0, 30.0])
+    own, each = torques(pose, com)
+    masses = (np.where(each > 0, high, low) - own) / each
+    attached = f"  - {{attach: {{mass: 1, com: [{1e3 * com[0]}, {1e3 * com[1]}, 0]}}}}\n"
+    found = held(pose, "{a: [-70, 90], b: [-20, 30]}", attached)
+    joint = int(masses.argmin())
+    assert found.mass == pytest.approx(masses[joint], rel=2e-6)
+    assert (found.joint, found.move, found.moves) == ("ab"[joint], 1, (0, 1))
+    assert found.limit == pytest.approx(np.where(each > 0, high, low)[joint])
+    assert found.effort == pytest.approx(found.limit, rel=1e-5)
+    assert found.com == pytest.approx([*com, 0])
+
+
+def test_a_counterweight_without_which_nothing_verifies() -> None:
+    """Behind the elbow: the links alone are too heavy, and so is a load that lifts them too hard."""
+    found = held((0, 0), "{a: 90, b: [-40, 3]}", "  - {attach: {mass: 1, com: [-600, 0, 0]}}\n")
+    own, each = torques((0, 0), (-0.6, 0))
+    assert own[1] > 3
+    assert found.mass == pytest.approx((-40 - own[1]) / each[1], rel=2e-6)
+    assert (found.joint, found.limit) == ("b", -40)
+
+
+def test_more_than_any_arm_carries_is_any_mass() -> None:
+    """A millionth of a degree beside the vertical, where a mass of some thousand tons is too much."""
+    assert held((89.99999, 0), "{a: 1000, b: 1000}", "").mass is None
+
+
+def _counted(job: str, at: int | None = None) -> tuple[PayloadCapacity, int]:
+    """Return the capacity, and with how many masses the job was planned."""
+    tried = set[float]()
+
+    def planned(loaded: LoadedJob, carried: Carried) -> Plan:
+        masses = (carried(k, None) for k in range(len(loaded.job.moves)))
+        tried.add(max(each.mass for each in masses if each is not None))
+        return plan_job(loaded, carried, advise=False)
+
+    return payload_capacity(job_from_text(job), at, planned), len(tried)
+
+
+@pytest.mark.parametrize(
+    ("job", "most"), [(CARRYING, 6), (CARRYING.replace("b: [-40, 30]", "b: [-15, 30]"), 6), (FREE, 12)]
+)
+def test_few_masses_are_tried_and_the_next_larger_one_fails(job: str, most: int) -> None:
+    """Where the motion is given its rows say which mass; else each has its own, and a line leads there."""
+    found, tried = _counted(job.replace("MASS", "0.5"))
+    assert tried <= most
+    largest = float(found.mass or 0)
+    assert verifies(job, largest)
+    assert not verifies(job, largest * (1 + 1e-6))
+
+
+TWO = CARRYING.replace("MASS", "1").replace(LAST, "") + (
+    "  - {attach: {mass: 2}}\n  - {planner: quintic, to: {joints: [0, 0]}, duration: 4}\n"
+)
+
+
+def test_of_several_payloads_the_one_that_is_meant() -> None:
+    """The others keep the mass that the job says, also where that is too much."""
+    alone, last, every = (payload_capacity(job_from_text(TWO), at) for at in (2, 5, None))
+    assert (alone.moves, last.moves, every.moves) == ((1, 2), (4, 5), (1, 2, 4, 5))
+    assert every.mass == pytest.approx(min(alone.mass or 0, last.mass or 0), rel=1e-6)
+    assert (every.com, last.com) == (None, pytest.approx([0, 0, 0]))
+    with pytest.raises(TrajcliError):
+        payload_capacity(job_from_text(TWO.replace("{mass: 2}", "{mass: 200}")), 2)
+    (one,) = payload_capacity(job_from_text(EMPTY), 0).moves
+    assert one == 0
+
+
+def test_only_limits_where_something_is_carried_count() -> None:
+    """Those of a move, in a job that has none."""
+    job = CARRYING.replace("MASS", "1").replace("limits: {effort: {a: 90, b: [-40, 30]}}\n", "")
+    own = "limits: {effort: {a: 90, b: [-40, 30]}}}"
+    elsewhere = job.replace("duration: 4}", f"duration: 4, {own}")
+    with pytest.raises(InputError, match="no limit of effort"):
+        payload_capacity(job_from_text(elsewhere))
+    here = job.replace("duration: 1.5}", f"duration: 1.5, {own}")
+    before = "  - {planner: hold, duration: 0.5}\n"  # behind `attach`, without a limit
+    here = here.replace(
+        "  - {planner: quintic, to: {joints: [20, 90]}",
+        f"{before}  - {{planner: quintic, to: {{joints: [20, 90]}}",
+    )
+    assert (payload_capacity(job_from_text(here)).mass or 0) > 0
+
+
+@pytest.mark.parametrize("target", [(160, 0), (20, 0)])
+def test_where_gravity_alone_binds_its_time_is_that_of_the_pose(target: Sequence[float]) -> None:
+    """A free duration is no help: where the arm reaches out furthest, at one end of the move."""
+    text = HEAD + "limits: {effort: {a: [-40, 60], b: 9}}\nstart: {joints: [90, 0]}\nmoves:\n"
+    text += "  - {attach: {mass: 1}}\n  - {planner: hold, duration: 0.5}\n"
+    text += f"  - {{planner: quintic, to: {{joints: {list(target)}}}}}\n  - {{planner: hold, duration: 1}}\n"
+    found = payload_capacity(job_from_text(text))
+    own, each = torques(target, (0, 0))
+    bounds = np.where(each > 0, [60, 9], [-40, -9])
+    masses = (bounds - own) / each
+    assert found.mass == pytest.approx(masses.min(), rel=1e-4)
+    assert found.joint == "ab"[int(masses.argmin())]
+    assert found.move in (2, 3)
+    assert found.time is not None
+    plan = plan_job(job_from_text(text))
+    reached = np.degrees(plan.trajectory.curve.evaluate(np.array([found.time]))[0])
+    assert reached == pytest.approx(target, abs=6)
