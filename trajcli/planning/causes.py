@@ -114,8 +114,8 @@ def _targets(loaded: LoadedJob, move: int) -> Iterator[tuple[str | int, ...]]:
     """Yield the paths of the targets of a move, then of its start; of a name that of its point."""
     through = loaded.document.node(("moves", move, "through"))
     count = len(through.value) if through is not None and isinstance(through.value, list) else 0
-    on_way = (("moves", move, "through", k) for k in range(count))
-    for path in [*on_way, ("moves", move, "to"), ("moves", max(move - 1, 0), "to")]:
+    points = (("moves", move, "through", k) for k in range(count))
+    for path in [*points, ("moves", move, "to"), ("moves", max(move - 1, 0), "to")]:
         node = loaded.document.node(path)
         name = None if node is None else node.value
         yield ("points", name) if isinstance(name, str) and name in loaded.job.points else path
