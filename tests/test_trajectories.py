@@ -113,7 +113,7 @@ def test_each_time_is_of_the_tool_and_the_payload_that_the_arm_has_then() -> Non
 
 def test_a_signal_is_zero_until_its_first_change_and_new_from_each_on() -> None:
     signal = Signal("grip", (SignalChange(1.0, 5.0, 0), SignalChange(2.0, -3.0, 1)))
-    times = np.array([0.0, 1.0 - 1e-9, 1.0 - 5e-13, 1.0, 1.5, 2.0, 9.0])
+    times = np.array([0.0, 1.0 - 2e-9, 1.0 - 5e-10, 1.0, 1.5, 2.0, 9.0])
     assert signal.values(times).tolist() == [0, 0, 5, 5, 5, -3, -3]
     assert Signal("never", ()).values(times).tolist() == [0] * 7
 

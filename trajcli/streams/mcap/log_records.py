@@ -259,17 +259,17 @@ class LogRecords:
         return data
 
     def _decompressed(self, chunk: Any) -> bytes:  # noqa: ANN401
-        most = chunk.uncompressed_size + 1
+        limit = chunk.uncompressed_size + 1
         try:
             if chunk.compression == "zstd":
                 import zstandard
 
                 reader = zstandard.ZstdDecompressor().stream_reader(chunk.data, read_across_frames=True)
-                return reader.read(most)
+                return reader.read(limit)
             if chunk.compression == "lz4":
                 import lz4.frame
 
-                unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=most)
+                unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=limit)
                 return unpacked
         except ImportError:
             raise
