@@ -65,6 +65,34 @@ def test_an_open_chain_has_a_freedom_for_each_joint(arms, name):
     assert "remark" not in report
 
 
+def test_letters_and_names_have_the_freedoms_of_their_kinds(arms):
+    given = "R,P,H,C,U,S,revolute,prismatic,helical,cylindrical,universal,spherical"
+    freedoms = arms.json("mobility", "--links", 13, "--joints", given)["freedoms"]
+    assert freedoms == 2 * [1, 1, 1, 2, 2, 3]  # Lynch and Park, Modern Robotics, table 2.1
+
+
+def test_space_and_passive_freedoms_count_for_a_robot_too(arms):
+    flat = arms.json("mobility", "--robot", "planar3r", "--space", "planar", "--passive", 1)
+    assert (flat["dof"], flat["lambda"], flat["passive"]) == (2, 3, 1)
+
+
+@pytest.mark.parametrize(
+    ("links", "joints", "space", "count", "remark"),
+    [
+        (5, "1x3", "spatial", "6 (5 - 1) - 3 x (6 - 1) - 0 = 9", "need at least 4 joints to hang together"),
+        (3, "1x3", "planar", "3 (3 - 1) - 3 x (3 - 1) - 0 = 0", "a structure"),
+        (4, "1x4,2x1", "planar", "3 (4 - 1) - 4 x (3 - 1) - 1 x (3 - 2) - 0 = 0", "a structure"),
+        (4, "1x2,3x2", "spatial", "6 (4 - 1) - 2 x (6 - 1) - 2 x (6 - 3) - 0 = 2", "a count for general"),
+        (2, "1x2", "planar", "3 (2 - 1) - 2 x (3 - 1) - 0 = -1", "overconstrained by 1:"),
+    ],
+)
+def test_the_formula_names_each_kind_and_the_number_is_explained(arms, links, joints, space, count, remark):
+    words = ("mobility", "--links", links, "--joints", joints, "--space", space)
+    report = arms.json(*words)
+    assert report["count"] == count
+    assert remark in report["remark"]
+
+
 def test_the_count_is_shown(arms):
     out = arms.call("mobility", "--links", 5, "--joints", "1x4").out
     assert "= 6 (5 - 1) - 4 x (6 - 1) - 0 = 4" in out
@@ -80,6 +108,9 @@ WRONG = [
     (["--links", "4", "--joints", "1x"], "expected freedoms or freedoms x count, got '1x'"),
     (["--links", "4", "--joints", "1x0"], "expected 1 to 10000 joints, got 0"),
     (["--links", "4", "--joints", "1x99999999999"], "expected 1 to 10000 joints"),
+    (["--links", "4", "--joints", "1x6000,2x6000"], "expected 1 to 10000 joints, got 6000 in '2x6000'"),
+    (["--links", "4", "--joints", "1x" + 5000 * "9"], "expected freedoms or freedoms x count"),
+    (["--links", "4", "--joints", 5000 * "9"], "expected freedoms or freedoms x count"),
     (["--links", "4", "--joints", "0x3"], "joint 0 has 0 freedoms, a spatial joint has 1 to 5"),
     (
         ["--links", "4", "--joints", "1,3", "--space", "planar"],

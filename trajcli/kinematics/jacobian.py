@@ -148,7 +148,7 @@ def _state(robot: Robot, q: ArrayLike, rates: ArrayLike) -> tuple[Array, Array]:
 
 
 def _start(robot: Robot, frame: ReferenceFrame) -> Array:
-    return np.eye(4) if frame == "base" else robot.base
+    return robot.standing_at(np.eye(4)).base if frame == "base" else robot.base
 
 
 def _columns(axis: JointAxis, p: VectorEntries) -> tuple[VectorEntries, VectorEntries]:

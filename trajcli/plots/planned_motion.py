@@ -142,7 +142,7 @@ class PlannedMotion:
         times = np.minimum(curve.breaks[piece] + local, curve.breaks[piece + 1])
         positions = curve.evaluate(times)
         spans = np.array([span.end for span in self.plan.trajectory.spans[:-1]]) + curve.start
-        owner = np.searchsorted(spans, times, "right")
+        owner = np.searchsorted(spans, 0.5 * (curve.breaks[piece] + curve.breaks[piece + 1]))
         low, high = np.empty(times.size), np.empty(times.size)
         for k, move in enumerate(self.moves):
             rows, limits = owner == k, move.robot.limits

@@ -81,4 +81,4 @@ def simplest(rows: Array) -> Array:
     first = np.array([np.argmax(row != 0.0) for row in left], dtype=np.intp)
     signs = np.sign(left[np.arange(len(left)), first])[:, None]
     unit: Array = left / (signs * np.linalg.norm(left, axis=1, keepdims=True))
-    return unit[np.argsort(first, kind="stable")] + 0.0
+    return unit[np.argsort(first, kind="stable")]

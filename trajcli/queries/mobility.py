@@ -18,7 +18,7 @@ LAMBDA = {"spatial": 6, "planar": 3}
 _JOINTS = {"revolute": 1, "prismatic": 1, "helical": 1, "cylindrical": 2, "universal": 2, "spherical": 3}
 _LETTERS = {name[0]: name for name in _JOINTS}
 _MOST = 10_000  # links or joints: what is above is a slip of the keyboard
-_TERM = re.compile(r"\s*(?P<kind>[A-Za-z]+|[0-9]+)\s*(?:[xX*]\s*(?P<count>[0-9]+)\s*)?")
+_TERM = re.compile(r"\s*(?P<kind>[A-Za-z]+|[0-9]{1,99})\s*(?:[xX*]\s*(?P<count>[0-9]{1,99})\s*)?")
 
 
 @comparable
