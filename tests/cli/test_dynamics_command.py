@@ -121,6 +121,16 @@ def test_columns_that_are_left_out_are_zero_and_named(arms, arm):
     assert [float(cell) for cell in outcome.out.splitlines()[1].split(",")] == pytest.approx(told, abs=1e-9)
 
 
+def test_rows_that_no_arm_has_are_refused_and_degrees_read_as_radians_remarked(arms, arm):
+    for kind in ("qd", "qdd"):
+        outcome = arms.call("dynamics", "-r", arm, "-", stdin=f"q1,q2,{kind}1,{kind}2\n0,0,1e30,0\n")
+        assert outcome.code == 2
+        assert "got 1e+30" in outcome.err
+    outcome = arms.call("dynamics", "-r", arm, "-", stdin="q1,q2\n0.3,90\n")
+    assert "is at 90 rad, more than two turns from zero" in outcome.err
+    assert outcome.out.splitlines()[0] == "tau1,tau2"
+
+
 def test_the_table_for_people(arms, arm):
     outcome = arms.call("dynamics", "-r", arm, "--payload", "{mass: 3}", 0, 0)
     assert outcome.code == 0

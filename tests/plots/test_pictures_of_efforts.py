@@ -15,6 +15,7 @@ from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.panel import Panel, Picture
 from trajcli.plots.picture import picture_of
+from trajcli.plots.planned_motion import PlannedMotion, effort_samples
 from trajcli.streams.reading import read_table
 from trajcli.streams.table import Table
 
@@ -128,6 +129,25 @@ def test_peaks_of_the_check_are_drawn_and_findings_are_marked() -> None:
     np.testing.assert_allclose(effort.findings, [[f.time + 10, f.value] for f in findings])
     np.testing.assert_allclose(effort.traces[0].y.max(), max(f.value for f in findings), rtol=1e-6)
     assert np.isnan(position.findings[:, 1]).all()
+
+
+def test_the_largest_efforts_to_either_side_are_points_of_the_line(plan: Plan) -> None:
+    samples = effort_samples(plan)
+    assert sum(peaks is not None for peaks in plan.verdict.efforts) >= 2
+    for peaks in plan.verdict.efforts:
+        for sign, side in () if peaks is None else ((1, peaks.highest), (-1, peaks.lowest)):
+            own = sign * samples.values[np.abs(samples.times - side[0].time) < 1e-12, 0]
+            assert np.abs(own - side[0].value).min() < 1e-9
+
+
+def test_one_move_that_limits_an_effort_is_enough() -> None:
+    motion = PlannedMotion(plan_job(job_from_text(PENDULUM.replace("effort: [-28, 30], ", ""))))
+    assert motion.has_effort_limits
+    assert motion.carries
+    free = PENDULUM.replace("effort: [-28, 30], ", "").replace("effort: 25", "velocity: 50")
+    motion = PlannedMotion(plan_job(job_from_text(free.replace(f"mass: {CARRIED}", "mass: 0"))))
+    assert not motion.has_effort_limits
+    assert not motion.carries
 
 
 def test_a_lift_is_driven_by_a_force() -> None:

@@ -107,9 +107,7 @@ output: {in: table}
     found = frame_of_rows(job)
     assert found is not None
     assert found[:3, 3] == pytest.approx([0.5, -0.2, 0.1])
-    assert found[:3, :3] == pytest.approx(
-        Rotation.from_euler("xyz", [40, -50, 60], degrees=True).as_matrix()
-    )
+    assert found[:3, :3] == pytest.approx(Rotation.from_euler("xyz", [40, -50, 60], degrees=True).as_matrix())
     q = np.radians([20.0, 50.0])
     assert found @ forward(job.robot_of_rows, q) == pytest.approx(forward(job.robot, q))
 

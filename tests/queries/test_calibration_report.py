@@ -54,11 +54,17 @@ def built(robot: Robot) -> Robot:
     one, two, three = robot.joints
     tool = robot.tool.copy()
     tool[:3, 3] += [0.002, -0.001, 0.003]
-    joints = one, replace(two, a=two.a + 0.0015, alpha=two.alpha + 0.004), replace(three, theta=three.theta - 0.01)
+    joints = (
+        one,
+        replace(two, a=two.a + 0.0015, alpha=two.alpha + 0.004),
+        replace(three, theta=three.theta - 0.01),
+    )
     return replace(robot, joints=joints, tool=tool)
 
 
-def measured(arm: ArmInUnits, folder: Path, q: np.ndarray, noise: tuple[float, float] = (0, 0), turns: bool = True) -> str:
+def measured(
+    arm: ArmInUnits, folder: Path, q: np.ndarray, noise: tuple[float, float] = (0, 0), turns: bool = True
+) -> str:
     """Write poses of the arm as it was built, with noise (m, rad), as a CSV in its units."""
     chance = np.random.default_rng(5)
     poses = forward(built(arm.robot), q)
@@ -80,7 +86,9 @@ def drawn(count: int) -> np.ndarray:
 
 def calibrated(file: str, folder: Path, noise: tuple[float, float] = (0, 0), count: int = 40) -> Calibration:
     arm = open_arm(file)
-    return calibration_of(arm, measured(arm, folder, drawn(count), noise), "j2.a,j2.alpha,j3.theta,tool.x,tool.y,tool.z")
+    return calibration_of(
+        arm, measured(arm, folder, drawn(count), noise), "j2.a,j2.alpha,j3.theta,tool.x,tool.y,tool.z"
+    )
 
 
 def test_the_file_has_the_found_numbers_in_its_own_units(file: str, tmp_path: Path) -> None:
@@ -155,7 +163,9 @@ def test_just_as_many_numbers_as_parameters_leave_nothing_for_the_noise(file: st
     arm = open_arm(file)
     rows = measured(arm, tmp_path, drawn(2), turns=False)
     six = "j1.theta,j1.d,j2.theta,j2.a,j2.alpha,j3.theta"
-    assert any("nothing is left to estimate the noise" in each for each in calibration_of(arm, rows, six).remarks)
+    assert any(
+        "nothing is left to estimate the noise" in each for each in calibration_of(arm, rows, six).remarks
+    )
     five = calibration_of(arm, rows, six.removesuffix(",j3.theta"))
     assert not any("noise" in each for each in five.remarks)
 
@@ -175,7 +185,10 @@ def test_an_arm_that_misses_by_more_than_its_length_is_remarked(
 ) -> None:
     arm = open_arm(file, base=f"{{xyz: [{10 + 1e3 * off}, 20, 30], rpy: [0, 0, 15]}}")
     rows = measured(open_arm(file), tmp_path, drawn(20))
-    assert any("more than its own length" in each for each in calibration_of(arm, rows, "base").remarks) == remarked
+    assert (
+        any("more than its own length" in each for each in calibration_of(arm, rows, "base").remarks)
+        == remarked
+    )
 
 
 PARTS: tuple[tuple[MeasuredPart, slice], ...] = (("position", slice(3)), ("pose", slice(6)))

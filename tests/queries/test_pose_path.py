@@ -79,7 +79,7 @@ def shortest(poses, most):
 def test_the_end_that_was_not_typed_takes_the_turns_and_the_triple_nearest_to_the_other(typed_first, wound):
     angles = np.array([0.3, -0.5, 2.0 + wound])  # a middle angle below zero: the triple that is not principal
     typed = end(angles, [0, 0, 0], TypedAngles("ZYZ", "current", tuple(angles)))
-    other = end(angles + [0.02, -0.03, 0.04], [1, 0, 0])
+    other = end(angles + np.array([0.02, -0.03, 0.04]), [1, 0, 0])
     ends = (typed, other) if typed_first else (other, typed)
     poses = pose_path(*ends, S, "line", "euler", ("ZYZ", "current"))
     assert poses[0][:3, :3] == pytest.approx(ends[0].pose[:3, :3], abs=1e-12)
@@ -104,14 +104,17 @@ def test_angles_about_fixed_axes_are_not_those_about_current_ones():
             angles = (1 - s) * np.array(a) + s * np.array(b)
             assert pose[:3, :3] == pytest.approx(Rotation.from_euler("xyz", angles).as_matrix(), abs=1e-12)
     plain = [PoseAtEnd(each.pose, None) for each in fixed]
-    for given, text in ((("ZYX", "fixed"), "zyx"), (("ZYX", "current"), "ZYX"), (None, "xyz")):
-        middle = pose_path(*plain, np.array([0.5]), "line", "euler", given)[0, :3, :3]
+    for euler, text in ((("ZYX", "fixed"), "zyx"), (("ZYX", "current"), "ZYX"), (None, "xyz")):
+        middle = pose_path(*plain, np.array([0.5]), "line", "euler", euler)[0, :3, :3]
         triples = [Rotation.from_matrix(each.pose[:3, :3]).as_euler(text) for each in fixed]
         assert middle == pytest.approx(Rotation.from_euler(text, np.mean(triples, axis=0)).as_matrix())
 
 
 def test_steps_are_read_with_their_frames_and_inverted():
-    words = ("{rpy: [10, 20, 30], xyz: [1, 2, 3]}", "{rpy: [-40, 50, 60], xyz: [3, 1, 2], frame: fixed, invert: true}")
+    words = (
+        "{rpy: [10, 20, 30], xyz: [1, 2, 3]}",
+        "{rpy: [-40, 50, 60], xyz: [3, 1, 2], frame: fixed, invert: true}",
+    )
     steps = read_steps(words, Units("deg", "m"))
     first, second = np.eye(4), np.eye(4)
     first[:3, :3] = Rotation.from_euler("xyz", [10, 20, 30], degrees=True).as_matrix()

@@ -62,7 +62,10 @@ def in_deg_and_mm(folder: Path) -> dict[str, Any]:
         ("[-0.1, 0.4], velocity: 0.6, acceleration: 0.7", "[-100, 400], velocity: 600, acceleration: 700"),
         ("alpha: -1, beta: 0.01", f"alpha: {-DEG!r}, beta: {0.01 * DEG!r}"),
         ("[null, 2]", f"[null, {2 * DEG!r}]"),
-        ("[1, 2, 3], rpy: [0.1, 0.2, 0.3]", f"[1000, 2000, 3000], rpy: [{0.1 * DEG!r}, {0.2 * DEG!r}, {0.3 * DEG!r}]"),
+        (
+            "[1, 2, 3], rpy: [0.1, 0.2, 0.3]",
+            f"[1000, 2000, 3000], rpy: [{0.1 * DEG!r}, {0.2 * DEG!r}, {0.3 * DEG!r}]",
+        ),
         ("[0.04, 0, 0.03]", "[40, 0, 30]"),
     ):
         assert plain in text
@@ -84,7 +87,11 @@ def test_every_number_of_the_file_comes_back_in_its_unit(own: bool, tmp_path: Pa
         assert shown == pytest.approx(np.array(row) * [angle, length, length, angle, angle])
     assert [joint["sign"] for joint in card["joints"]] == [1, -1, 1]
     for joint, limits, scale in (
-        (turn, {"position": (-2, 1.5), "velocity": (-1, 2), "acceleration": (-3, 3), "jerk": (-50, 50)}, angle),
+        (
+            turn,
+            {"position": (-2, 1.5), "velocity": (-1, 2), "acceleration": (-3, 3), "jerk": (-50, 50)},
+            angle,
+        ),
         (slide, {"position": (-0.1, 0.4), "velocity": (-0.6, 0.6), "acceleration": (-0.7, 0.7)}, length),
     ):
         for quantity, bounds in limits.items():
@@ -118,10 +125,16 @@ def arm(joints: str, folder: Path, more: str = "") -> Path:
     [
         ("{a: 0.4}, {a: 0.3}", "base: {xyz: [5, -6, 7]}", 0.7),
         ("{a: 0.4}, {a: 0.3, position: [1.5707963267948966, 3]}", "", 0.5),
-        ("{a: 0.4, position: [-7, 7]}, {a: 0.3, position: [-3, -2]}", "base: {xyz: [1, 2, 3]}",
-         np.sqrt(0.25 + 0.24 * np.cos(2))),
-        ("{type: prismatic, position: [-0.9, 0.4], alpha: 1.5707963267948966}, {type: prismatic, position: [0, 0.3]}", "base: {xyz: [0, 0, 9]}",
-         np.hypot(0.9, 0.3)),
+        (
+            "{a: 0.4, position: [-7, 7]}, {a: 0.3, position: [-3, -2]}",
+            "base: {xyz: [1, 2, 3]}",
+            np.sqrt(0.25 + 0.24 * np.cos(2)),
+        ),
+        (
+            "{type: prismatic, position: [-0.9, 0.4], alpha: 1.5707963267948966}, {type: prismatic, position: [0, 0.3]}",
+            "base: {xyz: [0, 0, 9]}",
+            np.hypot(0.9, 0.3),
+        ),
         ("{type: prismatic, sign: -1, d: 0.1, position: [-0.2, 0.4]}", "tool: {xyz: [0.4, 0, 0]}", 0.5),
     ],
 )
@@ -148,7 +161,12 @@ def test_only_slides_without_an_end_make_it_unlimited(tmp_path: Path) -> None:
     [
         ("{a: 1}, {a: 1, velocity: 2}, {a: 1}", "RRR", ["velocity"], True),
         ("{type: prismatic}, {a: 1}", "PR", [], False),
-        ("{a: 1, position: [0, 1]}, {a: 1, alpha: 1}, {a: 1, alpha: 2}, {a: 1, d: 1, jerk: 1}", "4R", ["position", "jerk"], False),
+        (
+            "{a: 1, position: [0, 1]}, {a: 1, alpha: 1}, {a: 1, alpha: 2}, {a: 1, d: 1, jerk: 1}",
+            "4R",
+            ["position", "jerk"],
+            False,
+        ),
     ],
 )
 def test_a_row_of_the_list(joints: str, kind: str, limits: list[str], closed: bool, tmp_path: Path) -> None:

@@ -85,7 +85,9 @@ def rows_of(values: np.ndarray, names: Sequence[str] = NAMES, more: np.ndarray |
     return TableBlocks(tuple(names), iter([rows[:3], rows[3:]]), "rows.csv")
 
 
-Q = np.array([[0.0, 0.1, -0.2], [2.1, -0.05, 0.4], [4.2, 0.0, 0.5], [4.6, 0.2, 0.9], [5.5, 0.1, 5.0], [7.5, 0.3, 7.0]])
+Q = np.array(
+    [[0.0, 0.1, -0.2], [2.1, -0.05, 0.4], [4.2, 0.0, 0.5], [4.6, 0.2, 0.9], [5.5, 0.1, 5.0], [7.5, 0.3, 7.0]]
+)
 
 
 def test_poses_are_products_of_matrices_and_their_quaternions_never_jump(arm: ArmInUnits) -> None:
@@ -106,7 +108,12 @@ def test_poses_are_products_of_matrices_and_their_quaternions_never_jump(arm: Ar
 @pytest.mark.parametrize("frame", few(["tcp", "base", "world"], 3))
 def test_jacobians_and_measures_are_those_of_differences(frame: str, arm: ArmInUnits) -> None:
     stream = jacobians_of(arm, rows_of(Q), frame)  # type: ignore[arg-type]
-    assert [column.name for column in stream.columns[:4]] == ["t", "manipulability", "inverse_condition", "J11"]
+    assert [column.name for column in stream.columns[:4]] == [
+        "t",
+        "manipulability",
+        "inverse_condition",
+        "J11",
+    ]
     rows = np.vstack(list(stream.blocks))
     assert rows[:, 0].tolist() == [5, 5.5, 6, 6.5, 7, 7.5]
     length = 0.3 + 0.1 + 0.05 + 0.02 + 0.15 + np.linalg.norm([0.01, 0.02, 0.03])  # as the documents define it
@@ -125,9 +132,7 @@ def test_a_report_is_in_rad_and_the_unit_of_length_and_its_bias_is_the_change_of
     q, qd, scale = Q[3], np.array([0.7, -0.4, 0.9]), np.repeat([1000.0, 1.0], 3)
     report = jacobian_report(arm, q, frame, qd)  # type: ignore[arg-type]
     plain = differences(arm.robot, q, frame)
-    assert np.array(report["jacobian"]) == pytest.approx(
-        plain * scale[:, None] * [1, 1e-3, 1], abs=1e-5
-    )
+    assert np.array(report["jacobian"]) == pytest.approx(plain * scale[:, None] * [1, 1e-3, 1], abs=1e-5)
     axes = {"world": np.eye(3), "base": arm.robot.base[:3, :3], "tcp": pose(arm.robot, q)[:3, :3]}[frame]
     step = 1e-4
     after, before = (differences(arm.robot, q + step * side * qd, "world") @ qd for side in (1, -1))
@@ -157,7 +162,9 @@ moves: [{planner: hold, duration: 1}]
         axes = np.eye(3) if frame == "world" else turned
         bias = (jacobian_report(arm, q + 1e-5, "world"), jacobian_report(arm, q - 1e-5, "world"))
         change = (np.array(bias[0]["jacobian"]) - np.array(bias[1]["jacobian"])) @ np.ones(3) / 2e-5
-        assert np.array(report["jdot_qd"]).reshape(2, 3) == pytest.approx(change.reshape(2, 3) @ axes, abs=1e-6)
+        assert np.array(report["jdot_qd"]).reshape(2, 3) == pytest.approx(
+            change.reshape(2, 3) @ axes, abs=1e-6
+        )
 
 
 def test_idle_motions_are_in_rad_and_m_with_exact_zeros(tmp_path: Path) -> None:

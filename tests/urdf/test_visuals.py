@@ -20,6 +20,7 @@ from trajcli.kinematics.forward import link_poses
 from trajcli.planning.plan import plan_job
 from trajcli.player.meshes import meshes_of_job, meshes_of_robot
 from trajcli.player.scene import scene_of_plan
+from trajcli.urdf import visuals
 from trajcli.urdf.mesh_files import ball, box, cylinder, read_mesh
 from trajcli.urdf.serial_robot import robot_of_urdf
 from trajcli.urdf.visuals import found_file, visuals_of
@@ -183,6 +184,67 @@ def test_surfaces_move_with_their_links(arm: Path) -> None:
         assert np.allclose(shown, expected, atol=1e-6)  # numbers of an STL have 24 bits
 
 
+VISUALS = """<robot name="arm">
+<material name="blue"><color rgba="0 0 1 1"/></material>
+<link name="rail"><visual><geometry><box size="1 1 1"/></geometry></visual></link>
+<link name="base"><visual><geometry><box size="2 2 2"/></geometry><material name="blue"><color rgba="1 0.5 0 1"/></material></visual>
+<visual><geometry><box size="3 3 3"/></geometry><material name="blue"/></visual>
+<visual><origin xyz="1 2"/><geometry><box size="9 9 9"/></geometry></visual>
+<visual><geometry><mesh filename="box.dae"/></geometry><material name="blue"/></visual>
+<visual><geometry><mesh filename="box.dae"/></geometry></visual></link>
+<link name="arm"><visual><geometry><box size="4 4 4"/></geometry></visual></link>
+<link name="hand"><visual><geometry><box size="5 5 5"/></geometry></visual></link>
+<joint name="slide" type="prismatic"><parent link="rail"/><child link="base"/><axis xyz="0 0 1"/></joint>
+<joint name="turn" type="continuous"><parent link="base"/><child link="arm"/><origin xyz="0 0 1" rpy="1.5708 0 0"/><axis xyz="0 0 1"/></joint>
+<joint name="roll" type="continuous"><parent link="arm"/><child link="hand"/><origin xyz="0 0 1000"/><axis xyz="0 0 1"/></joint>
+</robot>"""
+
+
+def sizes(path: Path, **options: object) -> list[tuple[int, float]]:
+    """Return row and edge of each box."""
+    surfaces = visuals_of(path.read_bytes(), str(path), **options).surfaces  # type: ignore[arg-type]
+    return [(row, round(float(np.ptp(surface.corners[..., 0])), 6)) for row, surface in surfaces]
+
+
+def test_every_visual_counts_with_its_own_colour_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(VISUALS)
+    (tmp_path / "box.dae").write_bytes(dae())
+    read, known = list[Path](), visuals.read_mesh
+    monkeypatch.setattr(visuals, "read_mesh", lambda file: read.append(file) or known(file))
+    found = visuals_of(path.read_bytes(), str(path))
+    assert [row for row, _ in found.surfaces] == [0, 1, 1, 1, 1, 2, 3]
+    own, named, painted, plain = (surface.color for row, surface in found.surfaces if row == 1)
+    assert (own, named, painted, plain) == ((1, 0.5, 0), (0, 0, 1), (0, 0, 1), (1, 0, 0))
+    assert read == [tmp_path / "box.dae"]
+    assert len(found.unread) == 1
+    assert "xyz: expected 3 numbers" in found.unread[0]
+
+
+def test_the_chain_is_the_one_that_is_named_and_as_exact_as_asked(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(VISUALS)
+    assert sizes(path) == [(0, 1), (1, 2), (1, 3), (2, 4), (3, 5)]
+    assert sizes(path, tip="arm") == [(0, 1), (1, 2), (1, 3), (2, 4), (2, 5)]
+    assert sizes(path, root="base", tip="arm") == [(0, 2), (0, 3), (1, 4), (1, 5)]
+    fixed = VISUALS.replace('name="roll" type="continuous"', 'name="roll" type="fixed"')
+    data = (
+        fixed.replace('xyz="0 0 1000"', 'xyz="0 0 1000" rpy="1.5708 0 0"')
+        .replace('<link name="hand"><visual>', '<link name="hand"><visual><origin xyz="0 1000 0"/>')
+        .encode()
+    )
+    for exact, angle in ((False, np.pi / 2), (True, 1.5708)):
+        robot = robot_of_urdf(data, "arm.urdf", exact=exact).robot
+        hand = visuals_of(data, "arm.urdf", exact=exact).surfaces[-1].surface
+        pose = link_poses(robot, np.zeros(2))[2]
+        shown = pose[:3, :3] @ hand.corners.reshape(-1, 3).mean(axis=0) + pose[:3, 3]
+        first, both = (np.array([0, -np.sin(each), np.cos(each)]) for each in (angle, 2 * angle))
+        across = np.array([0, both[2], -both[1]])  # y of the hand
+        assert shown == pytest.approx(np.array([0, 0, 1]) + 1000 * first + 1000 * across, abs=1e-6)
+
+
 def test_packages_are_found_where_ros_looks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     urdf = tmp_path / "arm_description/urdf/arm.urdf"
     places = {
@@ -192,12 +254,16 @@ def test_packages_are_found_where_ros_looks(tmp_path: Path, monkeypatch: pytest.
         "itself": tmp_path / "one/itself.stl",
         "ament": tmp_path / "install/share/far/ament.stl",
         "relative": tmp_path / "arm_description/urdf/relative.stl",
+        "cmake": tmp_path / "built/share/near/c make.stl",
+        "own": tmp_path / "arm_description/own.stl",
+        "inner": tmp_path / "arm_description/arm_description/own.stl",
     }
     for place in places.values():
         place.parent.mkdir(parents=True, exist_ok=True)
         place.touch()
     monkeypatch.setenv("ROS_PACKAGE_PATH", os.pathsep.join(map(str, (tmp_path / "ws/src", tmp_path / "one"))))
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
+    monkeypatch.setenv("CMAKE_PREFIX_PATH", str(tmp_path / "built"))
     names = {
         "above": "package://arm_description/meshes/above.stl",
         "beside": "package://other/meshes/beside.stl",
@@ -205,6 +271,9 @@ def test_packages_are_found_where_ros_looks(tmp_path: Path, monkeypatch: pytest.
         "itself": "package://one/itself.stl",
         "ament": "package://far/ament.stl",
         "relative": "relative.stl",
+        "cmake": "model://near/c%20make.stl",
+        "own": "package://arm_description/own.stl",  # the package itself comes before what is in it
+        "inner": "package://arm_description/arm_description/own.stl",
     }
     assert {key: found_file(name, urdf) for key, name in names.items()} == places
     assert found_file(f"file://{places['ros']}", urdf) == places["ros"]

@@ -180,10 +180,10 @@ class PlannedMotion:
             if motion is not None and motion.path is not None and motion.path.speeds is not None:
                 from trajcli.checks.tool import SampledTool
 
-                known = SampledTool(self.plan.trajectory, within, move.robot, motion).speed_runs
+                found = SampledTool(self.plan.trajectory, within, move.robot, motion).speed_runs
                 runs += [
                     replace(run, times=(run.times[0] + within.start, run.times[1] + within.start))
-                    for run in known
+                    for run in found
                 ]
         return runs
 
@@ -301,11 +301,11 @@ class PlannedMotion:
 
     def _tool_peaks(self) -> Array:
         """Return when the checks saw the tool fastest, move by move, shape (k,)."""
-        spans, known = self.plan.trajectory.spans, self.plan.verdict.tool_peaks
+        spans, seen = self.plan.trajectory.spans, self.plan.verdict.tool_peaks
         return np.array(
             [
                 span.start + peaks[kind.key].time
-                for span, peaks in zip(spans, known, strict=False)
+                for span, peaks in zip(spans, seen, strict=False)
                 if peaks is not None
                 for kind in SPEED_KINDS
             ]
@@ -466,8 +466,8 @@ def _efforts(
     viscous = np.array([joint.friction.viscous for joint in robot.joints])
     coulomb = np.array([joint.friction.coulomb for joint in robot.joints])
     signs = direction(horner(speeds, curve.lengths[:, None] / 2))
-    known = np.isfinite(np.concatenate([q, qd, qdd], axis=1)).all(axis=1)
+    finite = np.isfinite(np.concatenate([q, qd, qdd], axis=1)).all(axis=1)
     values = np.full(q.shape, np.nan)
-    values[known] = dynamics.rigid_effort(q[known], qd[known], qdd[known])
+    values[finite] = dynamics.rigid_effort(q[finite], qd[finite], qdd[finite])
     values += viscous * qd + coulomb * signs[piece]
     return np.minimum(curve.breaks[piece] + local, curve.breaks[piece + 1]), values

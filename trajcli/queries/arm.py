@@ -319,7 +319,7 @@ class LimitWatch:
         factors: Array,
         units: Sequence[str],
         times: Array | None = None,
-        room: float = 0.0,
+        slack: float = 0.0,
     ) -> None:
         """Count the next rows.
 
@@ -328,11 +328,11 @@ class LimitWatch:
             factors: SI per unit of each joint, shape (n,).
             units: Their names.
             times: Shape (N,), s.
-            room: What rounding may have added to a number, in the units.
+            slack: What rounding may have added to a number, in the units.
         """
         self.remark = self.remark or beyond_two_turns(self._robot, values, units)
         excess = beyond(values, self._robot.limits.position)
-        excess[np.abs(excess) <= room * factors] = 0.0
+        excess[np.abs(excess) <= slack * factors] = 0.0
         rows = np.flatnonzero(excess.any(axis=1))
         if len(rows) and self.first is None:
             row = int(rows[0])

@@ -61,7 +61,7 @@ class Calibration:
         parameters: The free ones.
         options: How residuals counted.
         fit: The calibrated robot.
-        known: How well its parameters are known.
+        accuracy: How well its parameters are known.
         remarks: What a user should know, one sentence each.
     """
 
@@ -71,7 +71,7 @@ class Calibration:
     parameters: tuple[ArmParameter, ...]
     options: Options
     fit: Fit
-    known: Uncertainty
+    accuracy: Uncertainty
     remarks: tuple[str, ...]
 
 
@@ -106,12 +106,12 @@ def calibration_of(arm: ArmInUnits, file: str, free: str, options: Options | Non
             hint=f"take at least {int(np.ceil(attainable / each))} measurements, or free fewer parameters",
         )
     fit = calibrate(robot, measurements, parameters, chosen)
-    known = uncertainty(fit, measurements, parameters, chosen)
+    accuracy = uncertainty(fit, measurements, parameters, chosen)
     remarks = (
         *_remarks_on_units(arm, measurements),
         *_remarks(robot, measurements, parameters, attainable, fit),
     )
-    return Calibration(arm, file, measurements, parameters, chosen, fit, known, remarks)
+    return Calibration(arm, file, measurements, parameters, chosen, fit, accuracy, remarks)
 
 
 def _remarks_on_units(arm: ArmInUnits, measurements: Measurements) -> Iterator[str]:
@@ -164,10 +164,10 @@ def _remarks(
 
 def calibration_report(calibration: Calibration) -> dict[str, Any]:
     """Return the calibration for programs, all in SI."""
-    fit, known, options = calibration.fit, calibration.known, calibration.options
+    fit, accuracy, options = calibration.fit, calibration.accuracy, calibration.options
     before, after = _residuals(calibration)
     nominal, values = _values(calibration)
-    rows = zip(calibration.parameters, nominal.tolist(), values.tolist(), known.deviations, strict=True)
+    rows = zip(calibration.parameters, nominal.tolist(), values.tolist(), accuracy.deviations, strict=True)
     report: dict[str, Any] = {
         "robot": calibration.arm.robot.name,
         "measurements": len(calibration.measurements.joints),
@@ -192,14 +192,14 @@ def calibration_report(calibration: Calibration) -> dict[str, Any]:
         "iterations": fit.iterations,
         "converged": fit.converged,
         "scale": options.length,
-        "noise": dict(zip(("position", "angle"), known.noise, strict=True)),
+        "noise": dict(zip(("position", "angle"), accuracy.noise, strict=True)),
         "correlations": [
             {
                 "first": _parameter_entry(pair.first),
                 "second": _parameter_entry(pair.second),
                 "value": pair.value,
             }
-            for pair in known.correlations
+            for pair in accuracy.correlations
         ],
         "remarks": list(calibration.remarks),
     }

@@ -59,8 +59,8 @@ def efforts_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = No
     """
     dynamics = InverseDynamics(arm.robot)
     inputs = joint_columns(arm.robot, rows)
-    known = {parse_column(name).kind for name in rows.names}
-    rates = [joint_columns(arm.robot, rows, kind) if kind in known else None for kind in _RATES]
+    missing = left_out(rows)
+    rates = [None if kind in missing else joint_columns(arm.robot, rows, kind) for kind in _RATES]
     groups: tuple[Group, ...] = (EFFORT,) if inputs.time is None else ("t", EFFORT)
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
     return Stream(columns, _efforts(dynamics, rows, inputs, rates, watch))
@@ -68,8 +68,8 @@ def efforts_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = No
 
 def left_out(rows: TableBlocks) -> tuple[str, ...]:
     """Return which of qd and qdd have no column, and count as zero."""
-    known = {parse_column(name).kind for name in rows.names}
-    return tuple(kind for kind in _RATES if kind not in known)
+    kinds = {parse_column(name).kind for name in rows.names}
+    return tuple(kind for kind in _RATES if kind not in kinds)
 
 
 def _efforts(

@@ -65,8 +65,8 @@ def refuse_far(values: Array, file: str) -> None:
     """
     largest = float(np.abs(values).max(initial=0.0))
     if largest > LARGEST_POSITION:
-        most = f"expected a magnitude of at most {LARGEST_POSITION:g} (rad, m)"
-        raise InputError(f"{file}: {most}, got {largest:.9g}", hint="check its exponent and its unit")
+        bound = f"expected a magnitude of at most {LARGEST_POSITION:g} (rad, m)"
+        raise InputError(f"{file}: {bound}, got {largest:.9g}", hint="check its exponent and its unit")
 
 
 def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None) -> Stream:
@@ -94,7 +94,7 @@ def _poses(
 ) -> Iterator[Array]:
     last = None
     places = {column.kind: (i, column.factor) for i, column in enumerate(map(parse_column, rows.names))}
-    known = [places[axis] for axis in "xyz"] if places.keys() >= {*kinds_of("pose")} else []
+    axes = [places[axis] for axis in "xyz"] if places.keys() >= {*kinds_of("pose")} else []
     for block in rows.blocks:
         q = inputs.values(block)
         refuse_far(q, rows.file)
@@ -104,8 +104,8 @@ def _poses(
         poses = forward(arm.robot, q)
         quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
         last = quaternions[-1]
-        if known and watch is not None:
-            stated = np.stack([block[:, i] * unit for i, unit in known], axis=1)
+        if axes and watch is not None:
+            stated = np.stack([block[:, i] * unit for i, unit in axes], axis=1)
             if watch.frame is not None:
                 stated = stated @ watch.frame[:3, :3].T + watch.frame[:3, 3]
             off = float(np.linalg.norm(stated - poses[:, :3, 3], axis=1).max())

@@ -93,9 +93,11 @@ def _freedom(kind: str) -> int:
         return int(kind)
     name = _LETTERS.get(kind.lower(), kind.lower())
     if name not in _JOINTS:
-        known = ", ".join(f"{name} ({freedom})" for name, freedom in _JOINTS.items())
+        listed = ", ".join(f"{name} ({freedom})" for name, freedom in _JOINTS.items())
         guess = did_you_mean(kind.lower(), list(_JOINTS))
-        raise InputError(f"there is no kind of joint '{kind}'", hint=f"{guess}; {known}" if guess else known)
+        raise InputError(
+            f"there is no kind of joint '{kind}'", hint=f"{guess}; {listed}" if guess else listed
+        )
     return _JOINTS[name]
 
 
@@ -112,12 +114,12 @@ def checked(linkage: Linkage) -> Linkage:
 
 
 def _problems(linkage: Linkage) -> Iterator[Problem]:
-    most, where = linkage.lam - 1, linkage.space
+    highest, where = linkage.lam - 1, linkage.space
     if not 1 <= linkage.links <= _MOST:
         yield Problem(f"expected 1 to {_MOST} links, the frame counted, got {linkage.links}")
     for index, freedom in enumerate(linkage.freedoms):
-        if not 1 <= freedom <= most:
-            message = f"joint {index} has {freedom} freedoms, a {where} joint has 1 to {most}"
+        if not 1 <= freedom <= highest:
+            message = f"joint {index} has {freedom} freedoms, a {where} joint has 1 to {highest}"
             rigid = "links without freedom between them are one link"
             yield Problem(message, rigid if freedom < 1 else None)
             break

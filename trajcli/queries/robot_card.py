@@ -166,9 +166,9 @@ def _dynamics_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
         "com": [round(x / length, 12) for x in link.com],
         "inertia": list(link.inertia),
     }
-    known: dict[str, Any] = {"friction": asdict(joint.friction) if joint.friction != Friction() else None}
-    known["rotor"] = joint.rotor or None
-    given = {key: value for key, value in known.items() if value is not None}
+    further: dict[str, Any] = {"friction": asdict(joint.friction) if joint.friction != Friction() else None}
+    further["rotor"] = joint.rotor or None
+    given = {key: value for key, value in further.items() if value is not None}
     return {"joint": joint.name, "effort": effort if effort != [None, None] else None, **given, "link": solid}
 
 

@@ -68,7 +68,8 @@ def _stl(data: bytes) -> Iterator[Surface]:
         )
         yield Surface(records["corners"].astype(float))
         return
-    words = [line.split()[1:4] for line in data.decode("ascii", "replace").splitlines() if "vertex" in line]
+    lines = map(str.split, data.decode("ascii", "replace").splitlines())
+    words = [line[1:4] for line in lines if line[:1] == ["vertex"]]
     yield Surface(np.array(words, float).reshape(-1, 3, 3))
 
 

@@ -148,14 +148,14 @@ def found_file(name: str, urdf: Path) -> Path | None:
     A package is looked for among the folders above the URDF, in those of ROS_PACKAGE_PATH, and in `share` of
     those of AMENT_PREFIX_PATH and CMAKE_PREFIX_PATH. Nothing is fetched.
     """
-    scheme, separator, rest = name.partition("://")
-    rest = unquote(rest)
+    scheme, separator, file = name.partition("://")
+    file = unquote(file)
     if not separator:
         paths: Iterator[Path] = iter([urdf.parent / name])
     elif scheme == "file":
-        paths = iter([Path(rest)])
+        paths = iter([Path(file)])
     elif scheme in ("package", "model"):
-        package, _, inside = rest.partition("/")
+        package, _, inside = file.partition("/")
         paths = (folder / inside for folder in _packages(package, urdf))
     else:
         return None

@@ -29,10 +29,17 @@ TURN = np.random.default_rng(3).normal(size=(9, 3)) * 0.02
 PLACES = POSES[:, :3, 3] + SHIFT
 TURNED = Rotation.from_rotvec(TURN) * Rotation.from_matrix(POSES[:, :3, :3])
 HEADINGS = np.arctan2(*TURNED.as_matrix()[:, [1, 0], 0].T)
-POSITION, PLANE, WHOLE, ORIENTATION = np.array([7, 1]), np.array([0, 4, 6]), np.array([8, 2]), np.array([3, 5])
+POSITION, PLANE, WHOLE, ORIENTATION = (
+    np.array([7, 1]),
+    np.array([0, 4, 6]),
+    np.array([8, 2]),
+    np.array([3, 5]),
+)
 KINDS = (
     MeasuredKind(POSITION, partial_target(PLACES[POSITION])),
-    MeasuredKind(PLANE, partial_target(PLACES[PLANE], fixed=(True, True, False), yaw=HEADINGS[PLANE], tool_axis="x")),
+    MeasuredKind(
+        PLANE, partial_target(PLACES[PLANE], fixed=(True, True, False), yaw=HEADINGS[PLANE], tool_axis="x")
+    ),
     MeasuredKind(WHOLE, partial_target(PLACES[WHOLE], rotation=TURNED.as_matrix()[WHOLE])),
     MeasuredKind(ORIENTATION, partial_target(rotation=TURNED.as_matrix()[ORIENTATION])),
 )
