@@ -289,7 +289,9 @@ class _Maker:
         unit, lines = self._display.units.length, tuple(traces)
         if motion is None:
             return PathViews(unit, lines, np.empty((0, 3)))
-        return PathViews(unit, lines, motion.tool_waypoints(), *motion.corners(), motion.named())
+        return PathViews(
+            unit, lines, motion.tool_waypoints(), motion.zones(), motion.programmed(), motion.named()
+        )
 
 
 def _phase_block(motion: PlannedMotion) -> PanelBlock:

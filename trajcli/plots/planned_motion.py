@@ -117,7 +117,9 @@ class PlannedMotion:
     def joint_trace(self, joint: int, quantity: str) -> tuple[Array, Array]:
         """Return times (N,) and values (N,) of a quantity of a joint, steps and extremes included."""
         if quantity == EFFORT:
-            efforts = self._known_efforts()
+            if self._efforts is None:
+                self._efforts = effort_samples(self.plan)
+            efforts = self._efforts
             points = without_repeats(efforts.times + self.offset, efforts.values[:, joint])
             return thinned(*points)
         times, values = component_points(self.plan.trajectory.curve, JOINT_ORDERS[quantity], joint)
@@ -253,10 +255,6 @@ class PlannedMotion:
         zones = flyby.zones if flyby else ()
         return tuple(zone.tool_path(self.moves[zone.move].robot) / scale for zone in zones)
 
-    def corners(self) -> tuple[Array, tuple[Array, ...]]:
-        """Return the zones and the programmed path within each."""
-        return self.zones(), self.programmed()
-
     def named(self) -> tuple[tuple[str, Array], ...]:
         """Return the names of points at which moves start and end, and where the tool is there (3,)."""
         from trajcli.kinematics.forward import forward
@@ -270,11 +268,6 @@ class PlannedMotion:
                     at = forward(move.robot, q)[:3, 3] / scale
                     named.setdefault((name, *(f"{value:.4g}" for value in at)), (name, at))
         return tuple(named.values())
-
-    def _known_efforts(self) -> EffortSamples:
-        if self._efforts is None:
-            self._efforts = effort_samples(self.plan)
-        return self._efforts
 
     def _sampled_tool(self) -> ToolSamples:
         from trajcli.kinematics.forward import forward

@@ -150,9 +150,8 @@ def _remarks(
     listed = [robot.joints[row].name for row in parallel_rows(robot)]
     swapped = [owner for owner in tilted if owner in listed]
     if swapped:
-        angle = np.degrees(PARALLEL)
-        listed_rows = ", ".join(swapped)
-        yield f"axes within {angle:g} deg of parallel: beta instead of d in the row of {listed_rows}"
+        rows = ", ".join(swapped)
+        yield f"axes within {np.degrees(PARALLEL):g} deg of parallel: beta instead of d in the row of {rows}"
     if not fit.converged:
         yield f"the steps have not come to rest after {fit.iterations}: do not trust the numbers"
     if fit.released:
@@ -174,7 +173,7 @@ def calibration_report(calibration: Calibration) -> dict[str, Any]:
         "parameters": [
             {
                 **_parameter_entry(parameter),
-                "unit": _unit(parameter),
+                "unit": "rad" if parameter.angular else "m",
                 "nominal": old,
                 "value": new,
                 "std": deviation,
@@ -238,10 +237,6 @@ def _share(share: Share) -> dict[str, Any]:
 
 def _parameter_entry(parameter: ArmParameter) -> dict[str, Any]:
     return {"joint": parameter.owner, "name": parameter.name}
-
-
-def _unit(parameter: ArmParameter) -> str:
-    return "rad" if parameter.angular else "m"
 
 
 def calibrated_text(calibration: Calibration, sheet: RobotSheet) -> str:

@@ -65,8 +65,8 @@ def refuse_far(values: Array, file: str) -> None:
     """
     largest = float(np.abs(values).max(initial=0.0))
     if largest > LARGEST_POSITION:
-        bound = f"expected a magnitude of at most {LARGEST_POSITION:g} (rad, m)"
-        raise InputError(f"{file}: {bound}, got {largest:.9g}", hint="check its exponent and its unit")
+        message = f"expected a magnitude of at most {LARGEST_POSITION:g} (rad, m), got {largest:.9g}"
+        raise InputError(f"{file}: {message}", hint="check its exponent and its unit")
 
 
 def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None) -> Stream:

@@ -112,9 +112,8 @@ def _step(value: Mapping[str, Any], context: ReadingContext) -> PoseStep:
         raise FlawError(f"expected true or false, got {shown(inverted)}", "invert")
     fields = {key: item for key, item in value.items() if key not in _OWN_KEYS}
     step = _end(fields, context)
-    if inverted:
-        return PoseStep(invert(step.pose), cast("Frame", frame), None)
-    return PoseStep(step.pose, cast("Frame", frame), step.typed)
+    pose, typed = (invert(step.pose), None) if inverted else (step.pose, step.typed)
+    return PoseStep(pose, cast("Frame", frame), typed)
 
 
 def _end(fields: Mapping[str, Any], context: ReadingContext) -> PoseStep:

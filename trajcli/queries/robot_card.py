@@ -36,7 +36,7 @@ class ReachRange:
 
 def kind_of(robot: Robot) -> str:
     """Return the joints from the base on, such as "RRP"; of one type their number: "6R"."""
-    letters = "".join("P" if kind == "prismatic" else "R" for kind in robot.joint_types)
+    letters = "".join("RP"[kind == "prismatic"] for kind in robot.joint_types)
     return f"{len(letters)}{letters[0]}" if len(set(letters)) == 1 and len(letters) > 3 else letters
 
 
@@ -166,9 +166,8 @@ def _dynamics_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
         "com": [round(x / length, 12) for x in link.com],
         "inertia": list(link.inertia),
     }
-    further: dict[str, Any] = {"friction": asdict(joint.friction) if joint.friction != Friction() else None}
-    further["rotor"] = joint.rotor or None
-    given = {key: value for key, value in further.items() if value is not None}
+    further = {"friction": joint.friction != Friction() and asdict(joint.friction), "rotor": joint.rotor}
+    given = {key: value for key, value in further.items() if value}
     return {"joint": joint.name, "effort": effort if effort != [None, None] else None, **given, "link": solid}
 
 
