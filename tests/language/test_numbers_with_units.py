@@ -1,0 +1,150 @@
+"""Numbers of files: their units, and the bounds of what a robot can need, on both sides of each."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import unicodedata
+
+import pytest
+
+from trajcli.errors import InputError
+from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.language.numbers import (
+    LONGEST_NAME,
+    FlawError,
+    Number,
+    ReadingContext,
+    flaw_of_name,
+    number_schema,
+    read_number,
+)
+from trajcli.language.per_joint import NamedValues
+from trajcli.units import Quantity, Units
+
+DEG = math.pi / 180
+MM = Units("deg", "mm")
+BOUNDED = [  # quantity, largest in SI, least above zero in SI
+    (Quantity("angle"), 1e12, 1e-15),
+    (Quantity("length"), 1e12, 1e-15),
+    (Quantity("angle", 1), 1e30, 1e-12),
+    (Quantity("length", 2), 1e30, 1e-12),
+    (Quantity("length", 3), 1e30, 1e-12),
+    (Quantity("time"), 1e12, 1e-12),
+    (Quantity("frequency"), 1e12, 1e-12),
+    (Quantity("ratio"), 1e12, 1e-12),
+    (Quantity("mass"), 1e12, 1e-12),
+]
+PER_UNIT = {"angle": DEG, "length": 1e-3}
+
+
+@pytest.mark.parametrize(("quantity", "most", "least"), BOUNDED)
+@pytest.mark.parametrize("units", [Units(), MM], ids=["si", "deg, mm"])
+def test_numbers_are_bounded_on_both_sides_in_any_unit(
+    quantity: Quantity, most: float, least: float, units: Units
+) -> None:
+    unit = 1.0 if units == Units() else PER_UNIT.get(quantity.dimension, 1.0)
+    for sign in (1, -1):
+        inside, outside = (sign * most / unit * factor for factor in (1 - 1e-9, 1 + 1e-9))
+        assert read_number(inside, quantity, units) == pytest.approx(sign * most, rel=1e-8)
+        with pytest.raises(FlawError, match="expected a magnitude of at most") as caught:
+            read_number(outside, quantity, units)
+        said = str(caught.value).split("at most ")[1].split(" ")[0].rstrip(",")
+        assert float(said) == pytest.approx(most / unit, rel=1e-5)
+    positive, context = Number(quantity, "", above=0.0), ReadingContext(units)
+    assert positive.read(least / unit * (1 + 1e-9), context) == pytest.approx(least, rel=1e-8)
+    with pytest.raises(FlawError, match="expected at least") as caught:
+        positive.read(least / unit * (1 - 1e-9), context)
+    assert float(str(caught.value).split("at least ")[1].split(" ")[0].rstrip(",")) == pytest.approx(
+        least / unit, rel=1e-5
+    )
+    schema = number_schema(quantity)
+    schema = schema.get("anyOf", [schema])[0]
+    assert schema["minimum"] == -schema["maximum"]
+    assert schema["maximum"] >= most / unit
+    above = number_schema(quantity, exclusiveMinimum=0.0)
+    assert above.get("anyOf", [above])[0]["minimum"] == least
+
+
+@pytest.mark.parametrize(
+    ("text", "quantity", "si"),
+    [
+        ("-90 deg", Quantity("angle"), -math.pi / 2),
+        ("1 rev/min", Quantity("angle", 1), 2 * math.pi / 60),
+        ("-3 mm/ms^2", Quantity("length", 2), -3000.0),
+        ("2 cm/min^3", Quantity("length", 3), 0.02 / 216000),
+        ("250 g", Quantity("mass"), 0.25),
+        ("2 kHz", Quantity("frequency"), 2000.0),
+        ("3 kN", Quantity("force"), 3000.0),
+        ("1.5 min", Quantity("time"), 90.0),
+    ],
+)
+def test_a_text_says_its_unit_whatever_that_of_the_file(text: str, quantity: Quantity, si: float) -> None:
+    for units in (Units(), MM):
+        assert read_number(text, quantity, units) == pytest.approx(si, rel=1e-15)
+    with pytest.raises(FlawError, match="expected a magnitude of at most"):
+        read_number(text.replace(text.split(" ", maxsplit=1)[0], "9e40"), quantity, MM)
+
+
+RULES = [  # the rule of a number, what it takes, what it refuses
+    ({"above": 0.0}, [1e-3, 7.0], [0.0, -1e-9]),
+    ({"at_least": 0.0}, [0.0, 1e-13, 7.0], [-1e-300]),
+    ({"above": 0.0, "at_most": 1.0}, [1e-3, 1.0], [0.0, 1.0 + 1e-15, -0.5]),
+    ({}, [-1.0, 0.0, 1e-300], []),
+]
+
+
+@pytest.mark.parametrize(("rule", "taken", "refused"), RULES)
+def test_rules_of_numbers_hold_at_their_ends(
+    rule: dict[str, float], taken: list[float], refused: list[float]
+) -> None:
+    number = Number(Quantity("ratio"), "", **rule)
+    assert [number.read(value, ReadingContext()) for value in taken] == taken
+    for value in [*refused, True, None, "1", math.nan, math.inf]:
+        with pytest.raises(FlawError):
+            number.read(value, ReadingContext())
+
+
+def test_names_are_texts_of_one_line_that_show() -> None:
+    assert flaw_of_name("") == "expected a text that is not empty"
+    assert flaw_of_name("ä" * LONGEST_NAME) is None
+    assert f"has {LONGEST_NAME + 1}" in (flaw_of_name("a" * (LONGEST_NAME + 1)) or "")
+    for letter in ("\n", "\x1b", "\u200e", "\u2028", "\u2029", "\ud800"):
+        assert "no control characters" in (flaw_of_name(f"a{letter}b") or ""), unicodedata.category(letter)
+    for letter in (" ", "\u00a0", "\U0001f600", "\u0301"):
+        assert flaw_of_name(f"a{letter}b") is None
+
+
+def job(line: str) -> LoadedJob:
+    text = f"version: 1\nrobot: {{joints: 2}}\nstart: {{joints: 0}}\n{line}\n"
+    return job_from_text(f"{text}moves: [{{planner: hold, duration: 1}}]\n")
+
+
+@pytest.mark.parametrize(
+    "name", ["here", "world", "base", "tool", "stop", "1", "-2.5", "+.5e-3", "7.", "1E9"]
+)
+def test_words_and_numbers_are_no_names_of_points(name: str) -> None:
+    for section, value in (("points", "{joints: 0}"), ("frames", "{}"), ("tools", "{}")):
+        with pytest.raises(InputError, match="is no name of a point, a frame or a tool"):
+            job(f'{section}: {{"{name}": {value}}}')
+
+
+@pytest.mark.parametrize("name", ["heres", "Here", "1a", "p1", "1 2", "e5", "-", ".", "ä", "0x1", "1_0"])
+def test_other_words_are(name: str) -> None:
+    assert list(job(f'points: {{"{name}": {{joints: 0}}}}').job.points) == [name]
+
+
+EMPTY = ["name:", "limits:", "tool:", "base:", "zone:", "output: {times: }", "limits: {tcp: {speed: }}"]
+
+
+@pytest.mark.parametrize("line", EMPTY)
+def test_what_may_be_left_out_may_not_be_left_empty(line: str) -> None:
+    with pytest.raises(InputError, match="got null"):
+        job(line)
+
+
+def test_named_values_survive_a_process() -> None:
+    """A batch sends its jobs to others."""
+    values = NamedValues((1.0, 0.0, 3.0), (True, False, True))
+    again = pickle.loads(pickle.dumps(values))
+    assert (again, again.named, again.by_index) == (values, values.named, {0: 1.0, 2: 3.0})
