@@ -69,6 +69,20 @@ def test_bounds_of_a_joint_itself_and_of_its_range() -> None:
         np.testing.assert_allclose(limits.velocity_by_position, scaled, rtol=1e-15)
 
 
+def test_rates_near_a_limit_are_above_zero_and_offsets_at_least_zero() -> None:
+    for near, message in (
+        ("deceleration: 0", "above 0, got 0"),
+        ("deceleration: -1", "above 0, got -1"),
+        ("deceleration: 1, offset: -1", "at least 0, got -1"),
+        ("deceleration: 1e-13", "expected at least 5.72958e-11"),
+    ):
+        robot = f"{{joints: [{{position: [0, 9], velocity_by_position: {{{near}}}}}]}}"
+        with pytest.raises(InputError, match=message):
+            job("{}", robot)
+    robot = "{joints: [{position: [0, 9], velocity_by_position: {deceleration: 1, offset: 0}}]}"
+    assert job("{}", robot).robot.limits.velocity_by_position.tolist() == [[DEG, 0]]
+
+
 POSITIONS = [
     ("[20, 30]", (20, 30)),
     ("[-30, -20]", (-30, -20)),
@@ -214,3 +228,33 @@ def test_rates_that_are_left_out_are_zero_and_the_others_are_written_by_name() -
         assert point.as_state().acceleration.tolist() == list(point.acceleration or ())
     text = dump_job(job("{}", more=f"points: {{p: {state}}}\n"))
     assert 'velocity: {roll: "0.08726646259971647 rad/s"}' in text
+
+
+@pytest.mark.parametrize("quantity", ["velocity", "acceleration", "jerk", "position"])
+def test_limits_of_a_move_are_those_of_its_joints_again_in_the_resolved_job(quantity: str) -> None:
+    moves = (
+        f"{{planner: hold, duration: 1, limits: {{{quantity}: {{lift: 5, roll: [-7, 6], turn: [null, 8]}}}}}}"
+    )
+    order = ["position", "velocity", "acceleration", "jerk"].index(quantity)
+    expected = [(-INF, 8 * DEG), (-0.005, 0.005), (-7 * DEG, 6 * DEG)]
+    for each in both(job("{}", moves=moves)):
+        limits = each.job.moves[0].limits
+        assert limits is not None
+        np.testing.assert_allclose(np.array(limits.of_order(order)), expected, rtol=1e-15)
+    for each in both(job("{}", moves=moves.replace("roll: [-7, 6], turn: [null, 8]", "turn: null"))):
+        limits = each.job.moves[0].limits
+        assert limits is not None
+        assert limits.of_order(order) == ((-INF, INF), (-0.005, 0.005), None)
+
+
+def test_efforts_of_a_move_are_those_of_its_joints_again_in_the_resolved_job() -> None:
+    moves = "{planner: hold, duration: 1, limits: {effort: {lift: [-5 N, 0.1 kN], turn: null}}}"
+    for each in both(job("{}", HEAVY, moves)):
+        limits = each.job.moves[0].limits
+        assert limits is not None
+        assert limits.effort == ((-INF, INF), (-5, 100))
+    (same,) = (
+        each.job.moves[0].limits for each in both(job("{}", HEAVY, moves.replace(", turn: null", "")))[1:]
+    )
+    assert same is not None
+    assert same.effort == (None, (-5, 100))

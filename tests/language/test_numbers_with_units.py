@@ -53,6 +53,7 @@ def test_numbers_are_bounded_on_both_sides_in_any_unit(
         assert float(said) == pytest.approx(most / unit, rel=1e-5)
     positive, context = Number(quantity, "", above=0.0), ReadingContext(units)
     assert positive.read(least / unit * (1 + 1e-9), context) == pytest.approx(least, rel=1e-8)
+    assert Number(quantity, "", above=0.0).read(least, ReadingContext()) == least
     with pytest.raises(FlawError, match="expected at least") as caught:
         positive.read(least / unit * (1 - 1e-9), context)
     assert float(str(caught.value).split("at least ")[1].split(" ")[0].rstrip(",")) == pytest.approx(

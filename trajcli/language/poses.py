@@ -20,6 +20,7 @@ from trajcli.language.numbers import (
     FlawError,
     Model,
     ReadingContext,
+    flaws_below,
     number_schema,
     read_number,
     refuse,
@@ -133,12 +134,10 @@ def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -
     pose = np.eye(4)
     if form is not None:
         try:
-            read = _READERS[form](value[form], context)
+            with flaws_below(form):
+                read = _READERS[form](value[form], context)
         except InputError as error:
             raise FlawError(str(error), form, hint=error.problems[0].hint) from None
-        except FlawError as error:
-            error.flaws = error.below(form)
-            raise
         if len(read) == 4 and "xyz" in value:
             raise FlawError(
                 "a 4x4 matrix already has a position", "xyz", hint="leave xyz out, or give a 3x3 matrix"
@@ -171,29 +170,34 @@ def read_numbers(
     return numbers
 
 
-def _homogeneous(rows: list[Any], context: ReadingContext) -> Array:
-    pose = np.eye(4)
-    for index, row in enumerate(rows[:3]):
-        if not isinstance(row, list) or len(row) != 4:
+def read_rows(value: Any, context: ReadingContext) -> tuple[tuple[float, ...], ...]:  # noqa: ANN401
+    """Return the rows of a 3x3 or 4x4 matrix, the position in m.
+
+    Raises:
+        FlawError: Names the first entry that does not fit.
+    """
+    if not isinstance(value, list | tuple) or len(value) not in (3, 4):
+        got = f"{len(value)} rows" if isinstance(value, list) else shown(value)
+        raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {got}")
+    rows, size = [], len(value)
+    for index, row in enumerate(value):
+        if not isinstance(row, list | tuple) or len(row) != size:
             got = f"{len(row)} values" if isinstance(row, list) else shown(row)
-            raise FlawError(f"expected a row of 4 numbers, got {got}", index)
-        pose[index, :3] = read_numbers(row[:3], 3, _RATIO, context, index)
-        pose[index, 3] = read_numbers(row[3:], 1, _LENGTH, context, index)[0]
-    last = read_numbers(rows[3], 4, _RATIO, context, 3)
-    if (last != [0, 0, 0, 1]).any():
-        row = ", ".join(f"{number:.9g}" for number in last.tolist())
-        raise FlawError(f"the last row of a 4x4 matrix must be [0, 0, 0, 1], it is [{row}]", 3)
-    pose[:3, :3] = _projected(pose[:3, :3])
-    return pose
+            raise FlawError(f"expected a row of {size} numbers, got {got}", index)
+        numbers = read_numbers(row[:3], 3, _RATIO, context, index).tolist()
+        with flaws_below(index, 3):
+            last = _RATIO if index == 3 else _LENGTH
+            rows.append((*numbers, *(read_number(item, last, context.units) for item in row[3:])))
+    return tuple(rows)
 
 
 def _matrix(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
-    if isinstance(value, list) and len(value) == 4:
-        return _homogeneous(value, context)
-    if not isinstance(value, list) or len(value) != 3:
-        got = f"{len(value)} rows" if isinstance(value, list) else shown(value)
-        raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {got}")
-    return _projected(np.stack([read_numbers(row, 3, _RATIO, context, i) for i, row in enumerate(value)]))
+    pose = np.array(read_rows(value, context))
+    if len(pose) == 4 and (pose[3] != [0, 0, 0, 1]).any():
+        row = ", ".join(f"{number:.9g}" for number in pose[3].tolist())
+        raise FlawError(f"the last row of a 4x4 matrix must be [0, 0, 0, 1], it is [{row}]", 3)
+    pose[:3, :3] = _projected(pose[:3, :3])
+    return pose
 
 
 def _projected(matrix: Array) -> Array:

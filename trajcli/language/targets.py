@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -29,7 +28,6 @@ from trajcli.language.numbers import (
     Number,
     ReadingContext,
     refuse,
-    shown,
     written_number,
 )
 from trajcli.language.per_joint import NamedValues, PerJoint
@@ -44,6 +42,7 @@ from trajcli.language.poses import (
     numbers_schema,
     read_direction,
     read_numbers,
+    read_rows,
 )
 from trajcli.trajectory import State
 from trajcli.units import Quantity
@@ -110,18 +109,7 @@ class Matrix(FieldType):
 
     def read(self, value: Any, context: ReadingContext) -> tuple[Row, ...]:  # noqa: ANN401
         """Return its rows, the position in m."""
-        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) not in (3, 4):
-            got = f"{len(value)} rows" if isinstance(value, list) else shown(value)
-            raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {got}")
-        size = len(value)
-        rows = []
-        for index, row in enumerate(value):
-            if not isinstance(row, Sequence) or isinstance(row, str) or len(row) != size:
-                raise FlawError(f"expected a row of {size} numbers, got {shown(row)}", index)
-            numbers = read_numbers(row[:3], 3, _RATIO, context, index).tolist()
-            last = _RATIO if index == 3 else _LENGTH
-            rows.append((*numbers, *read_numbers(row[3:], size - 3, last, context, index).tolist()))
-        return tuple(rows)
+        return read_rows(value, context)
 
     def write(self, value: tuple[Row, ...], context: ReadingContext) -> list[list[float | str]]:
         """Return its rows, the position with its unit."""
@@ -232,8 +220,6 @@ class PoseFields(Model):
         if form is not None:
             value = getattr(self, form)
             written[form] = value.model_dump(context=SI) if isinstance(value, Model) else value
-        if form == "matrix":
-            written[form] = [list(row) for row in written[form]]
         return Pose("").read(written, SI)
 
 

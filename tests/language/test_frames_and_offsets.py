@@ -1,0 +1,202 @@
+"""Frames, offsets from points and what they keep, against products of matrices."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from tiers import few
+
+from trajcli.errors import InputError
+from trajcli.job.dump import dump_job
+from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.language.targets import Target
+
+HEAD = "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\nbase: {xyz: [10, 20, 300], rpy: [5, -10, 70]}\n"
+FRAMES = """\
+frames:
+  cell: {xyz: [300, -100, 50], rpy: [3, 5, 20]}
+  tray: {in: cell, xyz: [10, 20, 30], rotvec: [10, 20, 30]}
+  bolt: {in: base, xyz: [100, 0, 7], quat_xyzw: [0, 0, 0.6, 0.8]}
+  flat: {xyz: [1, 2, 3]}
+"""
+MOVES = "start: {joints: [0, -90, 90, 0, 90, 0]}\nmoves: [{planner: hold, duration: 1}]\n"
+
+
+def pose(rotation: Rotation, *xyz: float) -> np.ndarray:
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = rotation.as_matrix(), np.array(xyz) / 1e3
+    return result
+
+
+def euler(*degrees: float) -> Rotation:
+    return Rotation.from_euler("xyz", degrees, degrees=True)
+
+
+CELL = pose(euler(3, 5, 20), 300, -100, 50)
+AXES = {
+    "world": np.eye(4),
+    "base": pose(euler(5, -10, 70), 10, 20, 300),
+    "cell": CELL,
+    "tray": CELL @ pose(Rotation.from_rotvec([10, 20, 30], degrees=True), 10, 20, 30),
+    "bolt": pose(euler(5, -10, 70), 10, 20, 300) @ pose(Rotation.from_quat([0, 0, 0.6, 0.8]), 100, 0, 7),
+    "flat": pose(Rotation.identity(), 1, 2, 3),
+}
+
+
+def read(points: str, moves: str = MOVES) -> LoadedJob:
+    return job_from_text(f"{HEAD}{FRAMES}points:\n{points}{moves}", "job.yaml")
+
+
+def again(job: LoadedJob) -> LoadedJob:
+    return job_from_text(dump_job(job).replace("{angle: deg, length: mm}", "{angle: rad, length: m}"))
+
+
+OFFSET = pose(euler(4, -5, 6), 1, -2, 3)
+OFFSET_TEXT = "offset: {xyz: [1, -2, 3], rpy: [4, -5, 6]}"
+ORIENTATIONS = [
+    "rpy: [170, 20, 30]",
+    "matrix: [[0, 1, 0], [1, 0, 0], [0, 0, -1]]",
+    "euler: {sequence: ZYZ, angles: [1, 2, 3]}",
+]
+TURNS = [euler(170, 20, 30), Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]]),
+         Rotation.from_euler("ZYZ", [1, 2, 3], degrees=True)]  # fmt: skip
+
+
+ALONG = [(outer, along) for along in (*AXES, "tool") for outer in AXES]
+
+
+@pytest.mark.parametrize(("outer", "along"), few(ALONG, 10))
+def test_an_offset_along_any_axes_from_a_point_in_any_frame(outer: str, along: str) -> None:
+    """In a chain of two, also where an offset does not turn; the point keeps its branch."""
+    for text, turn in zip(ORIENTATIONS, TURNS, strict=True):
+        start = AXES[outer] @ pose(turn, 40, 50, 60)
+        for offset, written in (
+            (OFFSET, OFFSET_TEXT),
+            (pose(Rotation.identity(), 0, 7, 0), "offset: {xyz: [0, 7, 0]}"),
+        ):
+            points = f"  a: {{in: {outer}, xyz: [40, 50, 60], {text}, configuration: {{elbow: up}}}}\n"
+            points += (
+                f"  b: {{from: a, {written}, frame: {along}}}\n  c: {{from: b, {written}, frame: {along}}}\n"
+            )
+            expected = start
+            job = read(points)
+            for name in ("a", "b", "c"):
+                for each in (job, again(job)):
+                    point = each.job.points[name]
+                    np.testing.assert_allclose(point.full_pose(), expected, atol=2e-14)
+                    assert point.configuration is not None
+                    assert point.configuration.elbow == "up"
+                axes = AXES.get(along, expected)[:3, :3]
+                moved = np.eye(4)
+                moved[:3, 3] = expected[:3, 3] + axes @ offset[:3, 3]
+                moved[:3, :3] = axes @ offset[:3, :3] @ axes.T @ expected[:3, :3]
+                expected = moved
+
+
+def test_what_stands_beside_from_is_kept_or_counts_more() -> None:
+    points = read(
+        "  a: {xyz: [1, 2, 3], rpy: [0, 0, 5], joints: {wrist_3_joint: 30}, velocity: 7, acceleration: 8}\n"
+        "  b: {from: a, offset: {xyz: [0, 0, 1]}}\n"
+        "  c: {from: b, joints: {elbow_joint: 10, wrist_3_joint: 20}, velocity: {wrist_1_joint: 9}, acceleration: 3}\n"
+        "  d: {xyz: [1, 2, 3], direction: [0, 3, 4], tool_axis: y}\n"
+        "  e: {from: d, offset: {xyz: [0, 0, 1]}, frame: tray}\n"
+    ).job.points
+    degrees = {name: {k: np.degrees(v) for k, v in (point.pinned.by_index if point.pinned else {}).items()}
+               for name, point in points.items()}  # fmt: skip
+    assert degrees["a"] == degrees["b"] == pytest.approx({5: 30})
+    assert degrees["c"] == pytest.approx({2: 10, 5: 20})
+    assert points["b"].velocity is None
+    assert points["b"].acceleration is None
+    assert points["c"].velocity == pytest.approx((0, 0, 0, np.radians(9), 0, 0))
+    assert points["c"].acceleration == pytest.approx((np.radians(3),) * 6)
+    assert (points["e"].direction, points["e"].tool_axis) == ((0, 3, 4), "y")
+
+
+def of_move(target: str) -> Target:
+    moves = MOVES.replace("{planner: hold, duration: 1}", f"{{planner: line, to: {target}}}")
+    text = "  j: {joints: [0, -90, 90, 0, 90, 0]}\n  h: {from: here, offset: {xyz: [0, 0, 1]}}\n  k: {joints_by: 3}\n"
+    job = read(text, moves)
+    (move,), (same,) = job.job.moves, again(job).job.moves
+    assert (job.waits, again(job).waits) == (True, True)
+    assert move.to == same.to  # type: ignore[attr-defined]
+    return move.to  # type: ignore[attr-defined, no-any-return]
+
+
+@pytest.mark.parametrize("origin", ["here", "j", "h", "k"])
+@pytest.mark.parametrize("along", [*AXES, "tool", ""])
+def test_what_only_the_plan_knows_is_kept_as_a_displacement(origin: str, along: str) -> None:
+    frame = f", frame: {along}" if along else ""
+    relative = of_move(f"{{from: {origin}, {OFFSET_TEXT}{frame}, configuration: {{elbow: down}}}}").relative
+    assert relative is not None
+    assert relative.origin == origin
+    start = pose(euler(10, 20, 30), 1, 2, 3)
+    axes = AXES[along][:3, :3] if along in AXES else start[:3, :3]
+    expected = np.eye(4)
+    expected[:3, :3] = axes @ OFFSET[:3, :3] @ axes.T @ start[:3, :3]
+    expected[:3, 3] = start[:3, 3] + axes @ OFFSET[:3, 3]
+    np.testing.assert_allclose(relative.after(start), expected, atol=1e-14)
+
+
+WRONG = [  # points, their message, line and what it points at
+    ("  p: {joints: 0, joints_by: 3}\n", "joints and joints_by exclude each other", "3}"),
+    ("  p: {joints_by: 3, xyz: [0, 0, 0]}\n", "joints_by and xyz exclude each other", "[0, 0, 0]"),
+    ("  p: {joints: 3, yaw: 3}\n", "joints and yaw exclude each other", "3}"),
+    ("  p: {xyz: [1, 2, 3], yaw: 3, pitch: 2}\n", "yaw and pitch exclude each other", "2}"),
+    ("  p: {rpy: [1, 2, 3], direction: z}\n", "rpy and direction exclude each other", "z}"),
+    ("  p: {rpy: [1, 2, 3], rotvec: [1, 2, 3]}\n", "rpy and rotvec exclude each other", "[1, 2, 3]}"),
+    ("  p: {xyz: [1, 2, 3], matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}\n", "already has a position", "[1, 2, 3], m"),
+    ("  p: {matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0.1, 1]]}\n", "the last row of a 4x4 matrix must be [0, 0, 0, 1], it is [0, 0, 0.1, 1]", "[0, 0, 0.1, 1]"),
+    ("  p: {matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [0, 0, 0, 1]]}\n", "expected a 3x3 or 4x4 matrix", "[[1"),
+    ("  p: {matrix: [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}\n", "the matrix mirrors space", "[[1"),
+    ("  p: {matrix: [[1, 0, 0, 1 deg], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}\n", "expected a length", "1 deg"),
+    ("  p: {matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1 mm]]}\n", "without a unit", "1 mm"),
+    ("  p: {configuration: {elbow: up}, joints: 0}\n", "configuration says something about a pose", "{elbow"),
+    ("  p: {tool_axis: x, joints: 0}\n", "tool_axis says something about a pose", "x,"),
+    ("  p: {xyz: [1, 2, x]}\n", "expected a length", "x]"),
+    ("  p: {rpy: [1, 2]}\n", "expected 3 numbers, got 2 values", "[1, 2]"),
+    ("  p: {rpy: [1, 2, 3, 4]}\n", "expected 3 numbers, got 4 values", "[1, 2, 3, 4]"),
+    ("  p: {acceleration: 3}\n", "a state needs `joints` or a pose", "{acc"),
+    ("  p: {xyz: [1, 2, 3], configuration: {abb: [0, 0, 0, 8]}}\n", "the last from 0 to 7", "[0, 0, 0, 8]"),
+    ("  p: {xyz: [1, 2, 3], configuration: {abb: [0, 0, 0, -1]}}\n", "the last from 0 to 7", "[0, 0, 0, -1]"),
+    ("  p: {xyz: [1, 2, 3], configuration: {kuka: {s: 32}}}\n", "from 0 to 31", "32"),
+    ("  p: {xyz: [1, 2, 3], configuration: {kuka: {s: B100000}}}\n", "from 0 to 31", "B100000"),
+    ("  p: {xyz: [1, 2, 3], configuration: {kuka: {s: 2, t: 64}}}\n", "from 0 to 63", "64"),
+    ("  p: {xyz: [1, 2, 3], configuration: {kuka: {s: true}}}\n", "from 0 to 31", "true"),
+    ("  p: {xyz: [1, 2, 3], configuration: {fanuc: N U X}}\n", "expected a FANUC configuration", "N U X"),
+    ("  p: {xyz: [1, 2, 3], configuration: {fanuc: N U T, wrist: flip}}\n", "fanuc and wrist exclude each other", "N U T"),
+    ("  p: {xyz: [1, 2, 3], configuration: {kuka: {s: 1}, abb: [0, 0, 0, 0]}}\n", "abb and kuka exclude each other", "[0,"),
+    ("  p: q\n  q: p\n", "named by itself (p -> q -> p)", "q\n"),
+    ("  p: {in: cell, configuration: {elbow: up}}\n", "configuration says something about a pose", "{elbow"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("points", "message", "at"), WRONG)
+def test_wrong_states_are_refused_where_they_stand(points: str, message: str, at: str) -> None:
+    with pytest.raises(InputError, match=re.escape(message)) as caught:
+        read(points)
+    place = caught.value.problems[0].place
+    assert place is not None
+    assert f"{place.source}\n"[place.column - 1 :].startswith(at)
+
+
+@pytest.mark.parametrize(
+    ("given", "s", "t"),
+    [("31", 31, None), ("B010", 2, None), ("'b11111'", 31, None), ("0", 0, 63), ("5", 5, 0)],
+)
+def test_bits_of_a_kuka_position(given: str, s: int, t: int | None) -> None:
+    turn = "" if t is None else f", t: {t}"
+    configuration = (
+        read(f"  p: {{xyz: [1, 2, 3], configuration: {{kuka: {{s: {given}{turn}}}}}}}\n")
+        .job.points["p"]
+        .configuration
+    )
+    assert configuration is not None
+    assert configuration.kuka is not None
+    assert (configuration.kuka.s, configuration.kuka.t) == (s, t)
+    assert configuration.branch_names == {}
+    named = read("  p: {xyz: [1, 2, 3], configuration: {wrist: flip}}\n").job.points["p"].configuration
+    assert named is not None
+    assert (named.branch_names, named.flags) == ({"wrist": "flip"}, None)
