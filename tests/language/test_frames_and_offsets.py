@@ -96,6 +96,37 @@ def test_an_offset_along_any_axes_from_a_point_in_any_frame(outer: str, along: s
                 expected = moved
 
 
+@pytest.mark.parametrize("order", ["abcd", "dcba", "cdab", "bdac"])
+def test_chains_are_products_in_whatever_order_they_are_written(order: str) -> None:
+    steps = {
+        "b": "{xyz: [1, 0, 0], rpy: [0, 0, 90]}",
+        "c": "{xyz: [0, 2, 0], rpy: [90, 0, 0]}",
+        "d": "{xyz: [0, 0, 3]}",
+    }
+    text = {"a": "{xyz: [7, 8, 9], rpy: [0, 90, 0]}"}
+    text |= {name: f"{{from: {before}, offset: {steps[name]}}}" for before, name in ("ab", "bc", "cd")}
+    points = read("".join(f"  {name}: {text[name]}\n" for name in order)).job.points
+    a = pose(euler(0, 90, 0), 7, 8, 9)
+    b = a @ pose(euler(0, 0, 90), 1, 0, 0)
+    c = b @ pose(euler(90, 0, 0), 0, 2, 0)
+    for name, expected in {"a": a, "b": b, "c": c, "d": c @ pose(euler(0, 0, 0), 0, 0, 3)}.items():
+        np.testing.assert_allclose(points[name].full_pose(), expected, atol=1e-15)
+
+
+def test_a_circle_of_points_is_named_by_those_in_it() -> None:
+    with pytest.raises(InputError) as caught:
+        read("  c: {from: a}\n  d: {from: c}\n  a: {from: b}\n  b: {from: a}\n  n: m\n  m: o\n  o: m\n")
+    said = [problem.message for problem in caught.value.problems]
+    assert said[:2] == ["the point 'a' is relative to itself (a -> b -> a)"] * 2
+    assert {text.partition(" (")[0] for text in said[2:4]} <= {
+        f"the point '{n}' is relative to itself" for n in "ab"
+    }
+    assert [text.partition(" (")[0] for text in said[4:]] == [
+        f"the point '{n}' is named by itself" for n in "mom"
+    ]
+    assert len(said) == 7
+
+
 def test_what_stands_beside_from_is_kept_or_counts_more() -> None:
     points = read(
         "  a: {xyz: [1, 2, 3], rpy: [0, 0, 5], joints: {wrist_3_joint: 30}, velocity: 7, acceleration: 8}\n"

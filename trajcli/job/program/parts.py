@@ -71,7 +71,9 @@ class Parts:
         if target is None or not isinstance(target.value, str | dict):
             raise self._names.refused("an approach needs a target `to`", (*path, "approach"))
         offset, frame = self._offset(fields["approach"], (*path, "approach"))
-        name = target.value if isinstance(target.value, str) else self._target(target, (*path, "to"))
+        name = (
+            target.value if isinstance(target.value, str) else self._names.add_target(target, (*path, "to"))
+        )
         first = {key: node for key, node in rest.items() if key not in _OF_THE_TARGET}
         first["to"] = _relative(target, name, offset, frame)
         first |= _zone(fields["approach"])
@@ -79,12 +81,6 @@ class Parts:
         before = MovePart(_mapping(entry, first), _written_in((*path, "approach"), "zone", "frame"))
         ending = self._straight(fields, "approach", path, last, entry)
         return [*parts, self._with_defaults(before), ending]
-
-    def _target(self, target: Node, path: _Path) -> str:
-        """Return the name of a point that is the target of a move without its rates."""
-        rates = ("velocity", "acceleration", "time", "blend")
-        fields = {key: node for key, node in fields_of(target).items() if key not in rates}
-        return self._names.add_target(_mapping(target, fields), path)
 
     def _straight(
         self, fields: Mapping[str, Node], key: str, path: _Path, target: Node, entry: Node
