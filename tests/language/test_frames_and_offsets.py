@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from tiers import few
 
-from trajcli.errors import InputError
+from trajcli.errors import InputError, PlanningError
 from trajcli.job.dump import dump_job
 from trajcli.job.read import LoadedJob, job_from_text
-from trajcli.language.targets import Target
+from trajcli.language.targets import Target, ik_target
 
 HEAD = "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\nbase: {xyz: [10, 20, 300], rpy: [5, -10, 70]}\n"
 FRAMES = """\
@@ -231,3 +231,98 @@ def test_bits_of_a_kuka_position(given: str, s: int, t: int | None) -> None:
     named = read("  p: {xyz: [1, 2, 3], configuration: {wrist: flip}}\n").job.points["p"].configuration
     assert named is not None
     assert (named.branch_names, named.flags) == ({"wrist": "flip"}, None)
+
+
+def test_steps_between_frames_are_along_the_axes_that_are_asked_for() -> None:
+    """Of the first one's own, of world or of the frame in which the first one is given."""
+    for outer, along, axes in (
+        ("world", "", np.eye(3)),
+        ("cell", "", AXES["cell"][:3, :3]),
+        ("cell", ", frame: world", np.eye(3)),
+        ("world", ", frame: bolt", AXES["bolt"][:3, :3]),
+        ("cell", ", frame: first", None),
+    ):
+        first = AXES[outer] @ pose(euler(7, 8, 9), 40, 50, 60)
+        more = f"  first: {{in: {outer}, xyz: [40, 50, 60], rpy: [7, 8, 9]}}\n"
+        more += f"  lane: {{grid: {{from: first, steps: [{{count: 3, xyz: [10, -20, 30]}}]{along}}}}}\n"
+        move = "{repeat: lane, moves: [{planner: line, to: {in: lane, xyz: [1, 2, 3], rpy: [0, 0, 0]}}]}"
+        text = f"{HEAD}{FRAMES}{more}{MOVES.replace('{planner: hold, duration: 1}', move)}"
+        for count, each in enumerate(job_from_text(text).job.moves):
+            place = first.copy()
+            axis = first[:3, :3] if axes is None else axes
+            place[:3, 3] += axis @ np.array([10, -20, 30]) * count / 1e3
+            expected = place @ pose(Rotation.identity(), 1, 2, 3)
+            np.testing.assert_allclose(each.to.full_pose(), expected, atol=1e-14)  # type: ignore[attr-defined]
+
+
+def test_what_stands_beside_a_pose_in_a_frame_is_kept() -> None:
+    beside = (
+        "velocity: 5, acceleration: {elbow_joint: 6}, joints: {wrist_3_joint: 30}, configuration: {elbow: up}"
+    )
+    for frame in AXES:
+        points = read(f"  p: {{in: {frame}, xyz: [1, 2, 3], rpy: [1, 2, 3], {beside}}}\n").job.points
+        assert points["p"].velocity == pytest.approx((np.radians(5),) * 6)
+        assert points["p"].acceleration == pytest.approx((0, 0, np.radians(6), 0, 0, 0))
+        assert points["p"].pinned is not None
+        assert points["p"].pinned.by_index == pytest.approx({5: np.radians(30)})
+        assert points["p"].configuration is not None
+
+
+@pytest.mark.parametrize("lean", ["[1e-6, 0, 0]", "[0, 1e-6, 0]", "[90, 0, 0]", "[0, -90, 0]"])
+def test_headings_and_elevations_are_about_a_vertical(lean: str) -> None:
+    for part, other in (("yaw", "pitch"), ("pitch", "yaw")):
+        text = f"{HEAD}frames: {{f: {{rpy: {lean}}}}}\npoints: {{p: {{in: f, {part}: 3}}}}\n{MOVES}"
+        with pytest.raises(
+            InputError, match=f"{part} is about the vertical, and the z axis of 'f' leans"
+        ) as caught:
+            job_from_text(text)
+        place = caught.value.problems[0].place
+        assert place is not None
+        assert place.source[place.column - 1 :].startswith("3}")
+        for upright in ("[0, 0, 40]", "[180, 0, 0]", "[0, 180, 0]", "[1e-8, 0, 0]"):
+            point = job_from_text(text.replace(lean, upright)).job.points["p"]
+            assert getattr(point, part) is not None
+            assert getattr(point, other) is None
+
+
+def test_elevations_in_frames_upside_down_and_upright() -> None:
+    for rpy, sign in (("[0, 0, 40]", 1), ("[180, 0, 0]", -1), ("[0, 180, 0]", -1)):
+        text = f"{HEAD}frames: {{f: {{rpy: {rpy}}}}}\npoints: {{p: {{in: f, pitch: -90, tool_axis: x}}}}\n{MOVES}"
+        point = job_from_text(text).job.points["p"]
+        assert point.pitch == pytest.approx(-sign * np.pi / 2)
+        target = ik_target(point)
+        assert (target.orientation, target.tool_axis) == ("direction", "x")
+        np.testing.assert_allclose(target.aims, [0, 0, -sign], atol=1e-15)
+
+
+def test_targets_fix_what_they_say_and_leave_the_rest_free() -> None:
+    text = (
+        "  a: {rpy: [0, 0, 90]}\n  b: {xyz: [1, 2, 3], yaw: 30, tool_axis: y}\n  c: {direction: [0, 3, 4], tool_axis: x}\n"
+        "  d: {xyz: [1, 2, 3]}\n  e: {pitch: 89}\n  f: {xyz: [1.1e12, 0, 0]}\n"
+        "  g: {matrix: [[1, 0, 0, 7], [0, 1, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1]]}\n"
+    )
+    points = read(text).job.points
+    found = {name: ik_target(points[name]) for name in "abcdeg"}
+    assert {name: (each.position[0], each.orientation, each.tool_axis) for name, each in found.items()} == {
+        "a": (False, "all", "z"),
+        "b": (True, "yaw", "y"),
+        "c": (False, "direction", "x"),
+        "d": (True, "none", "z"),
+        "e": (False, "pitch", "z"),
+        "g": (True, "all", "z"),
+    }
+    np.testing.assert_allclose(found["g"].poses[..., :3, 3], [0.007, 0.008, 0.009])
+    assert points["g"].gives_position
+    with pytest.raises(PlanningError, match="no robot reaches so far"):
+        ik_target(points["f"])
+
+
+@pytest.mark.parametrize("frame", AXES)
+def test_a_whole_matrix_in_a_frame_has_its_position_there(frame: str) -> None:
+    rows = "[[0, -1, 0, 7], [1, 0, 0, 8], [0, 0, 1, 9 cm], [0, 0, 0, 1]]"
+    job = read(f"  p: {{in: {frame}, matrix: {rows}}}\n  q: {{from: p, offset: {{xyz: [0, 0, 1]}}}}\n")
+    expected = AXES[frame] @ pose(euler(0, 0, 90), 7, 8, 90)
+    for each in (job, again(job)):
+        np.testing.assert_allclose(each.job.points["p"].full_pose(), expected, atol=1e-15)
+        above = expected @ pose(Rotation.identity(), 0, 0, 1)
+        np.testing.assert_allclose(each.job.points["q"].full_pose(), above, atol=1e-15)
