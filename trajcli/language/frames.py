@@ -43,8 +43,8 @@ def frame_named(name: Any, context: ReadingContext, chain: tuple[str, ...] = ())
     if name not in context.frames:
         from trajcli.suggest import did_you_mean, valid_names
 
-        known = (*context.frames, *_ABOVE)
-        hint = did_you_mean(name, known) or valid_names(known, "frames")
+        names = (*context.frames, *_ABOVE)
+        hint = did_you_mean(name, names) or valid_names(names, "frames")
         raise FlawError(f"there is no frame '{name}'", hint=hint)
     if name in chain:
         circle = chain[chain.index(name) :]
@@ -90,14 +90,14 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
         FlawError: When there is no such frame, no pose, or a part of an orientation that is about a vertical
             while that of the frame leans.
     """
-    rest = {key: item for key, item in value.items() if key != "in"}
-    given = {key: rest[key] for key in PoseFields.model_fields if key in rest}
+    others = {key: item for key, item in value.items() if key != "in"}
+    given = {key: others[key] for key in PoseFields.model_fields if key in others}
     with flaws_below("in"):
         frame = frame_named(value["in"], context)
     try:
         pose = PoseFields.model_validate(given, context=context)
     except ValidationError:
-        return rest
+        return others
     if not pose.gives_pose:
         text = "`in` says in which frame a pose is given, and there is none"
         raise FlawError(text, "in", AT_KEY, hint="leave it out")
@@ -111,7 +111,7 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
     if pose.gives_position:
         position = frame[:3, :3] @ pose.full_pose()[:3, 3] + frame[:3, 3]
         fields["xyz"] = [written_number(x, Quantity("length")) for x in position.tolist()]
-    return {**{key: item for key, item in rest.items() if key not in given}, **fields}
+    return {**{key: item for key, item in others.items() if key not in given}, **fields}
 
 
 def _turned(pose: PoseFields, axes: Array, name: str) -> dict[str, Any]:

@@ -218,10 +218,10 @@ def magnitude_schema(quantity: Quantity, *, positive: bool = False) -> JsonSchem
         positive: Whether it must be above zero.
     """
     units = Units("deg", "mm")
-    most = _largest(quantity) / factor(quantity, units)
-    digit = 10.0 ** (math.floor(math.log10(most)) - 2)
-    most = math.ceil(most / digit - _WHOLE) * digit
-    return {"minimum": _least(quantity) if positive else -most, "maximum": most}
+    largest = _largest(quantity) / factor(quantity, units)
+    digit = 10.0 ** (math.floor(math.log10(largest)) - 2)
+    largest = math.ceil(largest / digit - _WHOLE) * digit
+    return {"minimum": _least(quantity) if positive else -largest, "maximum": largest}
 
 
 def number_schema(quantity: Quantity, **stated: float) -> JsonSchemaValue:
@@ -256,10 +256,10 @@ def within_bounds(number: float, value: object, quantity: Quantity, units: Units
     Raises:
         FlawError: When it is too large.
     """
-    most = _largest(quantity)
-    if abs(number) <= most:
+    largest = _largest(quantity)
+    if abs(number) <= largest:
         return number
-    bound = f"{most / factor(quantity, units):.6g} {unit_name(quantity, units)}".rstrip()
+    bound = f"{largest / factor(quantity, units):.6g} {unit_name(quantity, units)}".rstrip()
     raise FlawError(f"expected a magnitude of at most {bound}, got {shown(value)}", hint=_BEYOND_ANY_ROBOT)
 
 

@@ -193,7 +193,7 @@ def _names_from(name: str, context: ReadingContext) -> list[str]:
     """Return a name and the names that it stands for, the last one that of a state."""
     points, names = context.points, [name]
     if name not in points:
-        raise FlawError(f"there is no point '{name}'", hint=_known(name, points))
+        raise FlawError(f"there is no point '{name}'", hint=_hint_to_names(name, points))
     while isinstance(state := points[names[-1]], str):
         if state in names:
             raise FlawError(f"the point '{state}' is named by itself ({' -> '.join([*names, state])})")
@@ -203,7 +203,7 @@ def _names_from(name: str, context: ReadingContext) -> list[str]:
     return names
 
 
-def _known(name: str, points: Mapping[str, Any]) -> str:
+def _hint_to_names(name: str, points: Mapping[str, Any]) -> str:
     from trajcli.suggest import did_you_mean, valid_names
 
     return did_you_mean(name, points) or valid_names(points, "points") or "the job has no `points`"
@@ -299,9 +299,9 @@ def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: 
         if key not in (*RELATIVE_FIELDS, *BESIDE):
             from trajcli.suggest import did_you_mean, valid_names
 
-            known = (*RELATIVE_FIELDS, *BESIDE[:4])
+            keys = (*RELATIVE_FIELDS, *BESIDE[:4])
             raise FlawError(
-                f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, known) or valid_names(known)
+                f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, keys) or valid_names(keys)
             )
     beside = {key: value[key] for key in value if key in BESIDE}
     pinned = point is not None and not PoseFields.model_fields.keys().isdisjoint(point)

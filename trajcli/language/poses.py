@@ -272,8 +272,8 @@ def _euler(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
     fields = _exactly(value, ("sequence", "angles"), ("frame",))
     sequence, frame = fields["sequence"], fields.get("frame", "current")
     if sequence not in SEQUENCES:
-        known = isinstance(sequence, str) and sequence.upper() in SEQUENCES
-        hint = f"did you mean '{sequence.upper()}'?" if known else f"one of {', '.join(SEQUENCES)}"
+        is_lower = isinstance(sequence, str) and sequence.upper() in SEQUENCES
+        hint = f"did you mean '{sequence.upper()}'?" if is_lower else f"one of {', '.join(SEQUENCES)}"
         raise FlawError(f"unknown sequence {shown(sequence)}", "sequence", hint=hint)
     if frame not in ("current", "fixed"):
         raise FlawError(f"expected current or fixed, got {shown(frame)}", "frame")
@@ -312,7 +312,7 @@ _READERS = {
 class Bits(FieldType):
     """A whole number of bits, or a text of them such as 'B010'."""
 
-    most: int
+    largest: int
     description: str
 
     def read(self, value: Any, context: ReadingContext) -> int:  # noqa: ANN401
@@ -321,14 +321,14 @@ class Bits(FieldType):
         if isinstance(value, str):
             text = value.strip().strip("'").upper()
             given = int(text[1:], 2) if re.fullmatch("B[01]{1,8}", text) else value
-        if type(given) is not int or not 0 <= given <= self.most:
-            message = f"expected a whole number from 0 to {self.most} or bits such as 'B010'"
+        if type(given) is not int or not 0 <= given <= self.largest:
+            message = f"expected a whole number from 0 to {self.largest} or bits such as 'B010'"
             raise FlawError(f"{message}, got {shown(value)}")
         return given
 
     def json_schema(self) -> JsonSchemaValue:
         """Return the schema of a number or a text of bits."""
-        number = {"type": "integer", "minimum": 0, "maximum": self.most}
+        number = {"type": "integer", "minimum": 0, "maximum": self.largest}
         return {"anyOf": [number, {"type": "string", "pattern": "^'?[Bb][01]{1,8}'?$"}]}
 
 

@@ -83,17 +83,17 @@ def joint_columns(table: Table, robot: Robot) -> Array:
         InputError: When a joint has no column or two, one of another unit, or a value that no robot has; or
             when there is a column of a joint beyond the last.
     """
-    known = [(name, column) for name in table.names if (column := _column(name, robot)) is not None]
-    for name, column in known:
+    present = [(name, column) for name in table.names if (column := _column(name, robot)) is not None]
+    for name, column in present:
         if (column.joint or 0) >= len(robot.joints):
             text = f"{table.file}: {name} is the column of joint {(column.joint or 0) + 1}"
             raise InputError(f"{text}, {robot.name} has {len(robot.joints)}")
     positions = np.empty((len(table.columns), len(robot.joints)))
     for joint in range(len(robot.joints)):
-        positions[:, joint] = _joint(table, robot, joint, known)
+        positions[:, joint] = _joint(table, robot, joint, present)
     if max(positions.max(initial=0.0), -positions.min(initial=0.0)) > LARGEST_POSITION:
-        most = f"{LARGEST_POSITION:g} rad or m"
-        raise InputError(f"{table.file}: a value is larger than {most}", hint="check its exponent and unit")
+        bound = f"{LARGEST_POSITION:g} rad or m"
+        raise InputError(f"{table.file}: a value is larger than {bound}", hint="check its exponent and unit")
     positions.flags.writeable = False  # who keeps it takes it without a copy
     return positions
 
@@ -108,11 +108,11 @@ def _refuse_other_times(table: Table) -> None:
         )
 
 
-def _joint(table: Table, robot: Robot, joint: int, known: list[tuple[str, Column]]) -> Array:
+def _joint(table: Table, robot: Robot, joint: int, present: list[tuple[str, Column]]) -> Array:
     """Return the values of a joint, rad or m, from the known columns of joints."""
     name, kind = robot.joint_names[joint], robot.joint_types[joint]
     unit = "mm" if kind == "prismatic" else "deg"
-    candidates = [each for each in known if each[1].joint == joint]
+    candidates = [each for each in present if each[1].joint == joint]
     if len(candidates) > 1:  # beside q1 a column x is the tool's, whatever joints are called
         own = [each for each in candidates if parse_column(each[0]).kind not in _LENGTHS]
         candidates = own or candidates
@@ -169,8 +169,8 @@ def _positions(table: Table) -> Array:
     """Return the positions (m, 3), m."""
     positions = np.stack([_length(table, name) for name in _LENGTHS], axis=1)
     if np.abs(positions).max() > LARGEST_POSITION:
-        most = f"{LARGEST_POSITION:g} m"
-        raise InputError(f"{table.file}: a value is larger than {most}", hint="check its exponent and unit")
+        bound = f"{LARGEST_POSITION:g} m"
+        raise InputError(f"{table.file}: a value is larger than {bound}", hint="check its exponent and unit")
     return positions
 
 
@@ -196,12 +196,12 @@ def _refuse_other_turns(table: Table) -> None:
 
 def _quaternions(table: Table) -> Array | None:
     """Return unit quaternions (m, 4), w first; None where there are no such columns."""
-    known = [name for name in _QUATERNION if name in table.names]
-    if not known:
+    present = [name for name in _QUATERNION if name in table.names]
+    if not present:
         _refuse_other_turns(table)
         return None
-    if len(known) < len(_QUATERNION):
-        lacking = ", ".join(name for name in _QUATERNION if name not in known)
+    if len(present) < len(_QUATERNION):
+        lacking = ", ".join(name for name in _QUATERNION if name not in present)
         hint = "give qw, qx, qy and qz, or none of them: the orientation is then kept"
         raise InputError(f"{table.file}: no column {lacking}", hint=hint)
     rows = np.stack([table.column(name) for name in _QUATERNION], axis=1)

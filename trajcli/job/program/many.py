@@ -176,19 +176,19 @@ class ManyNames:
             return self.meant(str(self._lists[name][rounds[name]].value), rounds)
         path, node = self._at[name]
         words = self.words(rounds, needed)
-        known = words if needed == (name,) else f"{name} ({words})"
-        while known in self._at:
-            known += "'"
+        made_name = words if needed == (name,) else f"{name} ({words})"
+        while made_name in self._at:
+            made_name += "'"
         made = self.made[self._sections[name]]
-        if known not in made:
+        if made_name not in made:
             if len(self._in_making) == _LONGEST_CHAIN:
                 message = f"more than {_LONGEST_CHAIN} points and frames are given one by the next"
                 raise self.refused(message, path, "give one of them as a pose of its own")
-            made[known] = (node, path)  # before what it names, which may be itself
-            self._in_making.append(known)
-            made[known] = (self._of_round(name, node, rounds), path)
+            made[made_name] = (node, path)  # before what it names, which may be itself
+            self._in_making.append(made_name)
+            made[made_name] = (self._of_round(name, node, rounds), path)
             self._in_making.pop()
-        return known
+        return made_name
 
     def _of_round(self, name: str, node: Node, rounds: Rounds) -> Node:
         if name not in self._grids:

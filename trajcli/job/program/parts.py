@@ -47,18 +47,18 @@ class Parts:
         if defaults is not None:
             names.only(defaults, _DEFAULTS, ("defaults",))
         self._defaults = fields_of(defaults)
-        self._known: dict[int, list[MovePart]] = {}
+        self._made: dict[int, list[MovePart]] = {}
 
     def of(self, entry: Node, path: _Path) -> list[MovePart]:
         """Return the plain moves that an entry of the moves is, in order."""
-        if id(entry) not in self._known:
-            self._known[id(entry)] = self._parts(entry, path)
-        return self._known[id(entry)]
+        if id(entry) not in self._made:
+            self._made[id(entry)] = self._parts(entry, path)
+        return self._made[id(entry)]
 
     def _parts(self, entry: Node, path: _Path) -> list[MovePart]:
         fields = fields_of(entry)
-        rest = {key: node for key, node in fields.items() if key not in ("approach", "retreat")}
-        if rest.keys() == fields.keys():
+        own = {key: node for key, node in fields.items() if key not in ("approach", "retreat")}
+        if own.keys() == fields.keys():
             return [self._with_defaults(MovePart(entry))]
         parts = []
         if "retreat" in fields:
@@ -66,7 +66,7 @@ class Parts:
             here = _relative(entry, "here", offset, frame)
             parts.append(self._straight(fields, "retreat", path, here, entry))
         if "approach" not in fields:
-            return [*parts, self._with_defaults(MovePart(_mapping(entry, rest)))]
+            return [*parts, self._with_defaults(MovePart(_mapping(entry, own)))]
         target = fields.get("to")
         if target is None or not isinstance(target.value, str | dict):
             raise self._names.refused("an approach needs a target `to`", (*path, "approach"))
@@ -74,7 +74,7 @@ class Parts:
         name = (
             target.value if isinstance(target.value, str) else self._names.add_target(target, (*path, "to"))
         )
-        first = {key: node for key, node in rest.items() if key not in _OF_THE_TARGET}
+        first = {key: node for key, node in own.items() if key not in _OF_THE_TARGET}
         first["to"] = _relative(target, name, offset, frame)
         first |= _zone(fields["approach"])
         last = _relative(target, "here", -offset, frame) if self._names.waits(name) else target

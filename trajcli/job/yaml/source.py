@@ -29,22 +29,22 @@ _WIDE_MARKS = (  # the marks of UTF-32 first: UTF-16's little-endian one is the 
 )
 
 
-def read_bytes(path: str, most: int = MAX_BYTES) -> bytes:
+def read_bytes(path: str, largest: int = MAX_BYTES) -> bytes:
     """Return the content of a file, or of standard input for `-`.
 
     Args:
         path: The file.
-        most: How many bytes it may have.
+        largest: How many bytes it may have.
 
     Raises:
         FileError: When it is missing or cannot be read.
         InputError: When it is longer.
     """
     if path == "-":
-        return _read_stdin(most)
+        return _read_stdin(largest)
     try:
         with Path(path).open("rb") as file:
-            data = file.read(most + 1)
+            data = file.read(largest + 1)
         size = max(Path(path).stat().st_size, len(data))
     except FileNotFoundError:
         raise FileError(f"there is no file '{path}'") from None
@@ -55,22 +55,22 @@ def read_bytes(path: str, most: int = MAX_BYTES) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a NUL byte in the path
         reason = getattr(error, "strerror", None) or error
         raise FileError(f"'{path}' cannot be read: {reason}") from None
-    return _bounded(data, path, size, most)
+    return _bounded(data, path, size, largest)
 
 
-def _read_stdin(most: int) -> bytes:
+def _read_stdin(largest: int) -> bytes:
     try:
-        data = sys.stdin.buffer.read(most + 1)
+        data = sys.stdin.buffer.read(largest + 1)
     except (OSError, ValueError, AttributeError) as error:  # closed, or absent: then sys.stdin is None
         raise FileError(f"standard input cannot be read: {error}") from None
-    return _bounded(data, STDIN, len(data), most)
+    return _bounded(data, STDIN, len(data), largest)
 
 
-def _bounded(data: bytes, file: str, size: int, most: int = MAX_BYTES) -> bytes:
-    if len(data) <= most:
+def _bounded(data: bytes, file: str, size: int, largest: int = MAX_BYTES) -> bytes:
+    if len(data) <= largest:
         return data
-    known = f"{size / 1e6:.1f} MB long" if size > most + 1 else f"longer than {most / 1e6:g} MB"
-    message = f"the file is {known}; at most {most / 1e6:g} MB ({most} bytes) are read"
+    length = f"{size / 1e6:.1f} MB long" if size > largest + 1 else f"longer than {largest / 1e6:g} MB"
+    message = f"the file is {length}; at most {largest / 1e6:g} MB ({largest} bytes) are read"
     raise InputError(Problem(message, place=Place(file, 1, 1)))
 
 
@@ -92,8 +92,8 @@ def decode(data: bytes, file: str) -> str:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         lines = split_lines(data[: error.start].decode("utf-8"))
-        rest = data[error.start : error.start + 200].decode("utf-8", "replace")
-        source = lines[-1] + split_lines(rest)[0]
+        remainder = data[error.start : error.start + 200].decode("utf-8", "replace")
+        source = lines[-1] + split_lines(remainder)[0]
         at = Place(file, len(lines), len(lines[-1]) + 1, source)
         message = (
             f"the byte 0x{data[error.start]:02X} is not UTF-8: the file is binary, or in another encoding"
