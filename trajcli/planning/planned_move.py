@@ -70,7 +70,9 @@ class Stand:
             joints = tuple((self._joints() + np.array(target.joints_by)).tolist())
             return target.model_copy(update={"joints_by": None, "joints": joints})
         pose = self._pose(target)
-        near = self.points.get(target.relative.origin) if target.relative is not None else None
+        near: Target | None = target
+        while near is not None and near.relative is not None:
+            near = self.points.get(near.relative.origin)
         fields: dict[str, Any] = {
             "relative": None,
             "near": None if near is None else near.joints,
