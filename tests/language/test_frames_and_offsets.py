@@ -146,6 +146,27 @@ def test_what_stands_beside_from_is_kept_or_counts_more() -> None:
     assert (points["e"].direction, points["e"].tool_axis) == ((0, 3, 4), "y")
 
 
+def test_what_a_point_relative_to_joints_says_of_its_branch_holds_for_those_relative_to_it() -> None:
+    job = read(
+        "  j: {joints: [0, -90, 90, 0, 90, 0]}\n"
+        "  a: {from: j, configuration: {elbow: down}, joints: {wrist_3_joint: 20}, velocity: 3}\n"
+        "  b: {from: a, offset: {xyz: [0, 0, 1]}}\n  c: {from: b, configuration: {wrist: flip}, joints: {elbow_joint: 10}}\n"
+    )
+    for each in (job, again(job)):
+        points = each.job.points
+        told = {
+            name: point.configuration and point.configuration.branch_names for name, point in points.items()
+        }
+        assert told == {"j": None, "a": {"elbow": "down"}, "b": {"elbow": "down"}, "c": {"wrist": "flip"}}
+        pins = [points[name].pinned for name in "abc"]
+        assert [pin and {k: round(np.degrees(v)) for k, v in pin.by_index.items()} for pin in pins] == [
+            {5: 20},
+            {5: 20},
+            {2: 10},
+        ]
+        assert points["b"].velocity is None
+
+
 def of_move(target: str) -> Target:
     moves = MOVES.replace("{planner: hold, duration: 1}", f"{{planner: line, to: {target}}}")
     text = "  j: {joints: [0, -90, 90, 0, 90, 0]}\n  h: {from: here, offset: {xyz: [0, 0, 1]}}\n  k: {joints_by: 3}\n"

@@ -304,10 +304,10 @@ def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: 
                 f"unknown key '{key}'", key, AT_KEY, hint=did_you_mean(key, keys) or valid_names(keys)
             )
     beside = {key: value[key] for key in value if key in BESIDE}
-    pinned = point is not None and not PoseFields.model_fields.keys().isdisjoint(point)
-    if pinned and point is not None and "joints" in point:
-        beside = {"joints": point["joints"], **beside}
-    if point is None or ("joints" in point and not pinned) or "joints_by" in point or RELATIVE in point:
+    posed = point is not None and not {RELATIVE, *PoseFields.model_fields}.isdisjoint(point)
+    if posed and point is not None:
+        beside = {key: point[key] for key in ("joints", "configuration") if key in point} | beside
+    if point is None or ("joints" in point and not posed) or "joints_by" in point or RELATIVE in point:
         if axes is not None:
             offset = moved(np.eye(4), offset, axes)
         rows = tuple(map(tuple, offset.tolist()))
