@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 from tiers import few
 
@@ -96,6 +97,20 @@ def test_axes_whose_length_vanishes_in_squares_are_refused_where_they_stand(vect
         place = caught.value.problems[0].place
         assert place is not None
         assert place.source[place.column - 1 :].startswith(vector)
+
+
+@pytest.mark.parametrize("decimals", [5, 8, 12])
+def test_a_rounded_matrix_stands_for_the_nearest_rotation(decimals: int) -> None:
+    rounded = np.round(TURN.as_matrix(), decimals)
+    nearest = polar(rounded)[0]
+    whole = np.vstack([np.column_stack([rounded, [1, 2, 3]]), [0, 0, 0, 1]])
+    for matrix in (rounded, whole):
+        text = f"version: 1\nrobot: ur5e\ntool: {{matrix: {matrix.tolist()}}}\nstart: {{joints: 0}}\n"
+        point = f"points: {{p: {{matrix: {matrix.tolist()}}}}}\n"
+        job = job_from_text(text + point + MOVES)
+        for read in (job.robot.tool, job.job.points["p"].full_pose()):
+            np.testing.assert_allclose(read[:3, :3], nearest, rtol=0, atol=1e-15)
+            np.testing.assert_allclose(read[:3, 3], (len(matrix) - 3) * np.array([1, 2, 3]))
 
 
 OFF = "matrix: [[1, 0, 4e-5], [0, 1, 0], [0, 0, 1]]"

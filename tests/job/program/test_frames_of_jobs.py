@@ -188,6 +188,8 @@ def test_rows_of_poses_in_a_frame(tmp_path: Path, capfd: pytest.CaptureFixture[s
 
 
 WRONG = [
+    ("  a: {from: base}\n", "", 8, "unknown key 'from'"),
+    ("  a: {from: base, offset: {xyz: [0, 0, 1]}, frame: world}\n", "", 8, "unknown key 'from'"),
     ("  a: {in: b}\n  b: {in: a}\n", "", 8, "'b' is given in itself (b -> a -> b)"),
     ("  a: {in: a}\n", "", 8, "'a' is given in itself"),
     ("  a: {in: wrld}\n", "", 8, "there is no frame 'wrld'"),
