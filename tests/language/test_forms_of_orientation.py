@@ -113,6 +113,33 @@ def test_a_rounded_matrix_stands_for_the_nearest_rotation(decimals: int) -> None
             np.testing.assert_allclose(read[:3, 3], (len(matrix) - 3) * np.array([1, 2, 3]))
 
 
+FAR = [  # units, a pose, whether it has a plain angle of more than two turns
+    ("rad", "rpy: [0, 0, -12.6]", True),
+    ("rad", "rpy: [12.6, 0, 0]", True),
+    ("rad", "rpy: [0, 12.5, -12.5]", False),
+    ("rad", "rotvec: [0, 90, 0]", True),
+    ("rad", "euler: {sequence: ZYZ, angles: [0, 0, 90]}", True),
+    ("rad", "quat_wxyz: [1, 0, 0, 0], configuration: {elbow: up}", False),
+    ("deg", "rpy: [800, 0, 0]", False),
+]
+
+
+@pytest.mark.parametrize(("unit", "form", "far"), FAR)
+def test_angles_that_look_like_degrees_are_seen(unit: str, form: str, far: bool) -> None:
+    units = f"units: {{angle: {unit}}}\n"
+    assert job_with(f"  p: {{xyz: [20, 30, 40], {form}}}\n", units).has_far_angle == far
+
+
+def test_a_pose_has_one_orientation_wherever_it_stands() -> None:
+    for two in (
+        "rpy: [0, 0, 0], rotvec: [0, 0, 0]",
+        "matrix: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], quat_xyzw: [0, 0, 0, 1]",
+    ):
+        for line in (f"tool: {{{two}}}", f"base: {{{two}}}", f"frames: {{f: {{{two}}}}}"):
+            with pytest.raises(InputError, match="exclude each other"):
+                job_with("  p: {joints: 0}\n", f"{line}\n")
+
+
 OFF = "matrix: [[1, 0, 4e-5], [0, 1, 0], [0, 0, 1]]"
 NOTED = [
     ("", f"  p: {{xyz: [0.4, 0, 0.3], {OFF}}}\n"),

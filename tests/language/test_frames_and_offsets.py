@@ -192,6 +192,21 @@ def test_what_only_the_plan_knows_is_kept_as_a_displacement(origin: str, along: 
     np.testing.assert_allclose(relative.after(start), expected, atol=1e-14)
 
 
+def test_a_point_that_cannot_stand_in_a_list_is_refused_there_and_a_wrong_one_where_it_is() -> None:
+    move = MOVES.replace("{planner: hold, duration: 1}", "{planner: spline, through: [halt, a], to: a}")
+    with pytest.raises(InputError) as caught:
+        read("  halt: {velocity: 0}\n  a: {joints: 3}\n", move)
+    (problem,) = caught.value.problems
+    assert problem.message == "a waypoint needs `joints` or a pose"
+    assert problem.place is not None
+    assert problem.place.source[problem.place.column - 1 :].startswith("halt, a]")
+    with pytest.raises(InputError) as caught:
+        read("  halt: {velocity: x}\n  a: {joints: 3}\n", move)
+    (problem,) = caught.value.problems
+    assert problem.place is not None
+    assert problem.place.source[problem.place.column - 1 :].startswith("x}")
+
+
 WRONG = [  # points, their message, line and what it points at
     ("  p: {joints: 0, joints_by: 3}\n", "joints and joints_by exclude each other", "3}"),
     ("  p: {joints_by: 3, xyz: [0, 0, 0]}\n", "joints_by and xyz exclude each other", "[0, 0, 0]"),

@@ -16,8 +16,8 @@ from trajcli.units import Quantity
 
 _ABOVE = ("world", "base")
 """Frames that every job has."""
-PLACE = "\0place"
-"""Key of a place in a grid of frames, which no file can write."""
+OF_GRID = "\0grid"
+"""Key of a frame of a grid, which no file can write."""
 _LONGEST_CHAIN = 100  # frames, each in the next
 _UPRIGHT = 1e-9  # rad from the vertical: rounding
 
@@ -74,8 +74,8 @@ def pose_of_frame(value: Any, context: ReadingContext, chain: tuple[str, ...] = 
     Raises:
         FlawError: When it is no pose, or given in no frame.
     """
-    if isinstance(value, Mapping) and PLACE in value:
-        value = value[PLACE]
+    if isinstance(value, Mapping) and OF_GRID in value:
+        value = value[OF_GRID]
         origin = frame_named(value["from"], context, chain)
         offset = Pose("").read(value["offset"], context)
         return moved(origin, offset, frame_named(value["frame"], context, chain)[:3, :3])

@@ -24,7 +24,7 @@ from trajcli.language.numbers import (
     written_number,
 )
 from trajcli.language.poses import Pose, moved
-from trajcli.language.targets import AIMS, RELATIVE, PoseFields, Relative, Target
+from trajcli.language.targets import RELATIVE, PoseFields, Relative, Target
 from trajcli.units import Quantity
 
 RELATIVE_DEFINITION = "relative to "
@@ -361,7 +361,7 @@ def _displaced(name: str, pose: PoseFields, offset: Array, axes: Array | None) -
     position = at[:3, 3] + along @ offset[:3, 3]
     fields = pose.model_dump(context=ReadingContext(), exclude_none=True, exclude={"xyz"})
     if turns or pose.rotation_form == "matrix":
-        kept = fields.keys() - {pose.rotation_form, *AIMS}
+        kept = fields.keys() - {pose.rotation_form}
         rotation = pose.given_rotation
         if turns:
             turn = offset[:3, :3] if axes is None else axes @ offset[:3, :3] @ axes.T

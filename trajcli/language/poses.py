@@ -219,7 +219,7 @@ def _quaternion(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
 
     numbers = read_numbers(value, 4, _RATIO, context)
     check_quaternion(numbers)
-    return matrix_from_quaternion(numbers / np.linalg.norm(numbers))
+    return matrix_from_quaternion(numbers)
 
 
 def _quaternion_w_last(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401

@@ -8,7 +8,7 @@ from math import prod
 from trajcli.errors import InputError, Problem
 from trajcli.frozen import frozen
 from trajcli.job.yaml.document import Document, Node
-from trajcli.language.frames import PLACE
+from trajcli.language.frames import OF_GRID
 from trajcli.language.numbers import FlawError, ReadingContext, written_number
 from trajcli.language.poses import read_numbers
 from trajcli.suggest import did_you_mean, valid_names
@@ -203,8 +203,8 @@ class ManyNames:
             "offset": node._replace(value={"xyz": xyz}, keys=None),
             "frame": frame._replace(value=self.meant(str(frame.value), rounds)),
         }
-        place = node._replace(value=fields, keys=None)
-        return place if self._sections[name] == "points" else place._replace(value={PLACE: place})
+        made = node._replace(value=fields, keys=None)
+        return made if self._sections[name] == "points" else made._replace(value={OF_GRID: made})
 
     def _frame_of(self, origin: Node) -> str:
         """Return the name of the frame in which a point or a frame is given, by itself or by others."""
