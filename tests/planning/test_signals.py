@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 from tiers import few
 
 from trajcli.errors import InputError
@@ -98,6 +99,46 @@ def test_about_a_corner_the_tool_enters_is_nearest_and_leaves(jerk: float | None
     wanted = where + (begin - where) * (5 / 80)
     off = np.linalg.norm(tool(plan, *fine) - wanted, axis=1)
     assert inside == pytest.approx(fine[off.argmin()], abs=fine[1] - fine[0])
+
+
+def test_between_two_zones_each_length_is_passed_where_the_tool_is_nearest_to_it() -> None:
+    """In the first zone, on the path, in the second: against a minimum that scipy finds."""
+    lengths = (4.0, 40.0, -3.0)
+    some = [at({"path": length}, value=k) for k, length in enumerate(lengths, 1)]
+    moves = [line(0, 0, 80, zone=20, at=at()), line(80, 0, 0, zone=15, at=[*some, at("enter", value=9)])]
+    plan = planned(
+        *moves, line(0, 60, 0, at=at("nearest", value=7)), limits={"acceleration": 800, "jerk": None}
+    )
+    (first, second), end = plan.trajectory.zones, plan.trajectory.duration
+    corner = planned(line(0, 0, 80), line(80, 0, 0), limits={"acceleration": 800, "jerk": None})
+    where, to = tool(corner, corner.moves[0].duration, corner.trajectory.duration)
+    set_at = dict(zip([c.value for c in plan.trajectory.signals[0].changes], times_of(plan), strict=True))
+    for value, length, within in zip((1, 2, 3), lengths, (first, (first[1], second[0]), second), strict=True):
+        point = where + (to - where) * (length / 80 if length > 0 else 1 + length / 80)
+        found = minimize_scalar(
+            lambda time, point=point: np.linalg.norm(tool(plan, time)[0] - point),
+            bounds=within,
+            method="bounded",
+            options={"xatol": 1e-9},
+        )
+        assert set_at[value] == pytest.approx(found.x, abs=1e-5), length
+        assert within[0] < set_at[value] < within[1]
+    assert set_at[9] == second[0]
+    assert first[0] < times_of(plan)[0] < first[1]
+    assert set_at[7] == end  # no zone: its arrival, whatever others are
+
+
+def test_lengths_count_from_both_ends_and_times_from_the_arrival() -> None:
+    alone = planned(line(0, 0, 80, at=[at({"path": 0}), at({"path": -80}, value=2)]))
+    assert times_of(alone) == pytest.approx([0.0, 0.0], abs=1e-5)
+    with pytest.raises(InputError, match="is set 81 mm along its path, which is 80 mm long"):
+        planned(line(0, 0, 80, at=at({"path": -81})))
+    arrival = alone.trajectory.duration
+    for before, time in [(arrival + 5e-13, 0.0), (-5e-13, arrival), (arrival, 0.0), (0.0, arrival)]:
+        assert times_of(planned(line(0, 0, 80, at=at("leave", before)))) == [time]
+    for before in (arrival + 5e-4, -5e-4):
+        with pytest.raises(InputError, match="outside of the job"):
+            planned(line(0, 0, 80, at=at("leave", before)))
 
 
 @pytest.mark.parametrize("length", few([210.0, 100.0, 130.0, 290.0], 1))

@@ -225,7 +225,7 @@ class LogRecords:
 
     def _index(self, content: bytes) -> tuple[int, NDArray[np.int64]]:
         number, length = struct.unpack_from("<HI", content)
-        entries = np.frombuffer(content[6 : 6 + length - length % 16], records.INDEX_ENTRY)
+        entries = np.frombuffer(content[6 : 6 + length], records.INDEX_ENTRY)
         return number, entries["offset"].astype(np.int64)
 
     def _single(self, record: bytes) -> tuple[Bytes, dict[int, NDArray[np.int64]]]:
