@@ -78,14 +78,14 @@ def log_blocks(
     Raises:
         InputError: When it is no whole MCAP file, or has no such topic.
     """
-    known = known_channels(stream, file)
-    chosen = _chosen(known, topic)
-    own = known.metadata.get(METADATA, {})
-    wanted = {chosen: _channels(known, chosen)}
-    accelerations = _channels(known, JOINT_ACCELERATIONS) if own and chosen == JOINT_STATES else set()
+    log = known_channels(stream, file)
+    chosen = _chosen(log, topic)
+    own = log.metadata.get(METADATA, {})
+    wanted = {chosen: _channels(log, chosen)}
+    accelerations = _channels(log, JOINT_ACCELERATIONS) if own and chosen == JOINT_STATES else set()
     if accelerations:
         wanted[JOINT_ACCELERATIONS] = accelerations
-    layouts = {c: _layouts(known, c, field) for channels in wanted.values() for c in channels}
+    layouts = {c: _layouts(log, c, field) for channels in wanted.values() for c in channels}
     states = {channel for channel in wanted[chosen] if layouts[channel] is not None}
     unstamped = bool(states) and _unstamped(LogRecords(stream, file), states)
     stream.seek(0)
@@ -180,22 +180,20 @@ def _same_joints(parts: Iterable[JointSeries], file: str, topic: str) -> Iterato
             yield part
 
 
-def _layouts(known: LogRecords, channel: int, field: str | None) -> _Layout:
+def _layouts(log: LogRecords, channel: int, field: str | None) -> _Layout:
     """Return where the parts of a channel's messages stand; None where each holds a trajectory."""
-    kind, topic = _type(known, channel), known.channels[channel].topic
+    kind, topic = _type(log, channel), log.channels[channel].topic
     if kind != definitions.CONTROLLER_STATE:
         if field is not None:
             hint = f"--field is about topics of {definitions.CONTROLLER_STATE}"
-            raise InputError(
-                f"the topic {topic} of {known.file} holds {kind}, which has one state", hint=hint
-            )
+            raise InputError(f"the topic {topic} of {log.file} holds {kind}, which has one state", hint=hint)
         return joint_state_layout if kind == definitions.JOINT_STATE else None
-    schema = known.schemas[known.channels[channel].schema_id]
+    schema = log.schemas[log.channels[channel].schema_id]
     fields = definitions.point_fields(schema.data.decode("utf-8", "replace"))
     if not fields:
-        raise InputError(f"the definition of {kind} in {known.file} is of an unknown form")
+        raise InputError(f"the definition of {kind} in {log.file} is of an unknown form")
     if field not in fields:
-        message = f"the topic {topic} of {known.file} holds the states {', '.join(fields)}"
+        message = f"the topic {topic} of {log.file} holds the states {', '.join(fields)}"
         near = None if field is None else did_you_mean(field, fields)
         message += "" if field is None else f", and no '{field}'"
         raise InputError(message, hint=near or f"choose one: --field {' or --field '.join(fields)}")
@@ -208,18 +206,18 @@ def _controller_layout(fields: tuple[str, ...], field: str) -> _Layout:
     return partial(controller_state_layout, fields=fields, field=field)
 
 
-def _type(known: LogRecords, channel: int) -> str:
-    schema = known.schemas.get(known.channels[channel].schema_id)
+def _type(log: LogRecords, channel: int) -> str:
+    schema = log.schemas.get(log.channels[channel].schema_id)
     return "" if schema is None else schema.name
 
 
-def _channels(known: LogRecords, topic: str) -> set[int]:
-    return {number for number, channel in known.channels.items() if channel.topic == topic}
+def _channels(log: LogRecords, topic: str) -> set[int]:
+    return {number for number, channel in log.channels.items() if channel.topic == topic}
 
 
-def _chosen(known: LogRecords, topic: str | None) -> str:
-    every = {channel.topic: number for number, channel in known.channels.items()}
-    fit = [name for name, number in every.items() if _type(known, number) in _READ]
+def _chosen(log: LogRecords, topic: str | None) -> str:
+    every = {channel.topic: number for number, channel in log.channels.items()}
+    fit = [name for name, number in every.items() if _type(log, number) in _READ]
     if topic is None and JOINT_STATES in fit:
         topic = JOINT_STATES
     elif topic is None and len(fit) == 1:
@@ -227,19 +225,19 @@ def _chosen(known: LogRecords, topic: str | None) -> str:
     if topic is None:
         what = "several topics with joints" if fit else "no topic with joints"
         hint = valid_names(fit, "name one with --topic") or valid_names(every, "its topics")
-        raise InputError(f"{known.file} has {what}: of {' or '.join(_READ)}", hint=hint)
+        raise InputError(f"{log.file} has {what}: of {' or '.join(_READ)}", hint=hint)
     if topic not in every:
         hint = did_you_mean(topic, every) or valid_names(fit or every, "its topics")
-        raise InputError(f"{known.file} has no topic '{topic}'", hint=hint)
+        raise InputError(f"{log.file} has no topic '{topic}'", hint=hint)
     if topic not in fit:
-        found = _type(known, every[topic]) or "messages without a schema"
+        found = _type(log, every[topic]) or "messages without a schema"
         raise InputError(
-            f"the topic {topic} of {known.file} holds {found}",
+            f"the topic {topic} of {log.file} holds {found}",
             hint=f"topics of {' or '.join(_READ)} are read" + (f": {', '.join(fit)}" if fit else ""),
         )
-    encoding = known.channels[every[topic]].message_encoding
+    encoding = log.channels[every[topic]].message_encoding
     if encoding != "cdr":
-        raise InputError(f"the topic {topic} of {known.file} is encoded as '{encoding}'", hint="cdr is read")
+        raise InputError(f"the topic {topic} of {log.file} is encoded as '{encoding}'", hint="cdr is read")
     return topic
 
 
