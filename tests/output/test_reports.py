@@ -11,6 +11,7 @@ import pytest
 
 from trajcli.job.read import job_from_text
 from trajcli.job.report import MoveReport, PeakReport, Report
+from trajcli.kinematics.forward import forward
 from trajcli.output.report import report_of
 from trajcli.planning.plan import Plan, plan_job
 
@@ -186,3 +187,106 @@ def test_points_on_the_way_are_passed_at_their_times_and_left_by_as_much_as_is_s
         assert found[key] == pytest.approx((beyond, time), abs=5e-3 * move.duration, rel=1e-3)
         assert found[key][0] == pytest.approx(beyond, rel=1e-3, abs=1e-6)
     assert [one.unit for one in move.outside] == ["m" if one.joint == "b" else "rad" for one in move.outside]
+
+
+def reported(moves: list[dict[str, Any]], **fields: Any) -> tuple[Plan, Report]:
+    plan = plan_job(job_from_text(json.dumps({**JOB, "moves": moves, **fields})))
+    return plan, report_of(plan)
+
+
+def test_signals_of_all_names_are_said_in_order_of_time() -> None:
+    there = {"planner": "quintic", "to": {"joints": [1.5, -1.2, 0.2]}, "duration": 3}
+    back = {
+        "planner": "quintic",
+        "to": {"joints": [1.0, -1.0, 0.0]},
+        "duration": 4,
+        "at": {"signal": "z", "value": 7, "before": 1.5},
+    }
+    moves = [
+        {"signal": "z", "value": 1},
+        there,
+        {"signal": "a", "value": 2},
+        back,
+        {"signal": "z", "value": 0},
+    ]
+    _, report = reported(moves)
+    found = [(one.name, one.value, one.move, one.time) for one in report.signals]
+    assert found == [("z", 1, 0, 0.0), ("a", 2, 2, 3.0), ("z", 7, 3, 5.5), ("z", 0, 4, 7.0)]
+
+
+def test_every_concession_and_every_remark_is_said_once() -> None:
+    short = {"planner": "quintic", "duration": 0.5, "when_over_limit": "slow"}
+    moves = [{**short, "to": {"joints": joints}} for joints in ([1.5, -1.2, 0.2], [1.0, -1.0, 0.0])]
+    plan, report = reported([*moves, JOB["moves"][3]])
+    assert [event.move for event in report.events if event.kind == "slowed"] == [0, 1]
+    said = [(one.kind, one.message, one.move) for one in (*report.events, *report.remarks)]
+    assert said == [(one.kind, one.message, one.move) for one in (*plan.events, *plan.remarks)]
+    assert [move.stretch > 1 for move in report.moves] == [True, True, False]
+
+
+def test_steps_and_knots_are_in_the_units_of_the_joint_that_they_are_about() -> None:
+    """Of a slide and a hinge; the hinge stands, so that what knots miss is of the slide."""
+    joints = [{"velocity": 1, "acceleration": 2}, {"type": "prismatic", "velocity": 1, "acceleration": 2}]
+    moves = [{"planner": "septic", "to": {"joints": [0, 1]}, "duration": 4}]
+    _, report = reported(moves, robot={"joints": joints}, start={"joints": [0, 0]})
+    assert report.knots is not None
+    missed = report.knots.deviation
+    assert (missed.position_unit, missed.velocity_unit) == ("m", "m/s")
+    assert 0 < missed.position <= 1e-6
+    moves = [{"planner": "trapezoid", "to": {"joints": [1, 0.5]}, "synchronize": "none"}]
+    _, report = reported(moves, robot={"joints": joints}, start={"joints": [0, 0]})
+    assert {step.unit for step in report.steps} == {"rad/s^2", "m/s^2"}
+    assert {abs(step.size) for step in report.steps} == {2.0, 4.0} or {abs(s.size) for s in report.steps} == {
+        2.0
+    }
+
+
+def test_a_finding_is_said_with_its_value_its_limit_and_its_time() -> None:
+    moves = [
+        {"planner": "hold", "duration": 1},
+        {"planner": "quintic", "to": {"joints": [1.0, -1.0, 2.0]}, "duration": 1},
+    ]
+    plan, report = reported(moves)
+    assert report.verdict == "violated"
+    found = {one.kind: one for one in report.findings}
+    assert found["velocity"].value == pytest.approx(2 * 15 / 8)
+    assert (found["velocity"].limit, found["velocity"].move, found["velocity"].joint) == (3, 1, "c")
+    assert found["velocity"].time == pytest.approx(1.5)
+    assert len(report.findings) == len(plan.verdict.findings)
+
+
+LINE: dict[str, Any] = {
+    "robot": "ur5e",
+    "limits": {"acceleration": 6, "velocity": {"shoulder_pan_joint": 0.5}},
+    "start": {"joints": [0, -1.6, 1.6, -1.6, -1.6, 0]},
+}
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.6, 3.0])
+def test_the_wanted_speed_along_a_path(speed: float) -> None:
+    """Held where a joint lets it, all the way but for the ends, or nowhere; by the forward kinematics."""
+    away = {
+        "planner": "jerk_limited",
+        "to": {"joints": [0.4, -1.4, 1.6, -1.6, -1.6, 0]},
+        "limits": {"jerk": 60},
+    }
+    line = {"planner": "line", "to": {"from": "here", "offset": {"xyz": [0.6, -0.2, 0.1]}}}
+    plan, report = reported([away, {**line, "law": {"shape": "time_optimal", "speed": speed}}], **LINE)
+    assert plan.verdict.passed
+    move = report.moves[1]
+    tool = move.tool
+    assert tool is not None
+    t = np.linspace(move.start, move.end, 4001)
+    places = forward(plan.loaded.robot, plan.trajectory.curve.evaluate(t))[:, :3, 3]
+    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    rates = np.gradient(gone, t)
+    fast = rates >= 0.999 * speed
+    assert tool.length == pytest.approx(np.linalg.norm([0.6, 0.2, 0.1]), rel=1e-6)
+    assert (tool.wanted_speed, tool.unit, tool.speed_unit) == (speed, "m", "m/s")
+    assert tool.held == pytest.approx(np.diff(gone)[fast[1:] & fast[:-1]].sum() / gone[-1], abs=0.02)
+    assert tool.deviation <= 1e-5
+    (peak,) = [each for each in tool.peaks if each.quantity == "speed"]
+    assert peak.value == pytest.approx(rates.max(), rel=1e-3)
+    assert move.start < peak.time < move.end
+    assert np.interp(peak.time, t, rates) == pytest.approx(rates.max(), rel=1e-3)
+    assert tool.lowest is None  # it is not left and taken up again

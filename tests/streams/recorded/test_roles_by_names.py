@@ -25,6 +25,8 @@ def roles(names: str, columns: str | None = None, joints: list[str] | None = Non
         ("t,q0,q1,qd2,qd1", None, {"qd": "qd1 qd2"}),
         ("t,q1,q2,qd1,qd2", "qd=none", {"q": "q1 q2", "rest": "qd1 qd2"}),
         ("t,q1,none", "qd1=none", {"qd": "none"}),
+        ("t,q1,none", "qd=none", {"q": "q1", "rest": "none"}),
+        ("t,q1,none,tau1", "tau=none", {"q": "q1", "rest": "none tau1"}),
         ("t,q1,q2,q_error1,q_error2", None, {"q": "q1 q2", "rest": "q_error1 q_error2"}),
         ("t,actual_q_1,target_q_1,actual_qd_1,target_qd_1", "q=target_q", {"q": "target_q_1", "qd": "target_qd_1"}),
         ("t,A1,A2,A3", "q=A", {"q": "A1 A2 A3"}),

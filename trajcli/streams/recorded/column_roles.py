@@ -155,7 +155,7 @@ class _Assignment:
 
     def roles(self) -> ColumnRoles:
         for key, value in self._mapping.items():
-            if value.lower() != NONE or value in self._file.names:
+            if value.lower() != NONE or (key not in JOINT_QUANTITIES and value in self._file.names):
                 self._map(key, value)
         positions = self._positions()
         for quantity in JOINT_QUANTITIES[1:]:
