@@ -38,6 +38,19 @@ def test_our_own_columns_are_about_joints_by_number(joints: list[str], tmp_path:
     assert (motion.t.tolist(), motion.q.tolist(), found.joints) == ([0.0], [[1.0, 2.0]], tuple(joints))
 
 
+@pytest.mark.parametrize("name", ["segment", "part 3", "q9", "none"])
+@pytest.mark.parametrize("joints", [["a"], ["a", "b"]])
+def test_any_column_may_be_said_to_count_moves(name: str, joints: list[str], tmp_path: Path) -> None:
+    head = ",".join(["t", *(f"q{k + 1}" for k in range(len(joints))), name])
+    rows = [",".join([f"{k}", *("0.5" for _ in joints), f"{k // 2}"]) for k in range(4)]
+    said = [f"q{k + 1}=q{k + 1}" for k in range(len(joints))]
+    found = opened(tmp_path, "\n".join([head, *rows, ""]), joints, ",".join([*said, f"move={name}"]))
+    motion = found.whole()
+    assert motion.move is not None
+    assert (motion.move.tolist(), motion.q.shape) == ([0, 0, 1, 1], (4, len(joints)))
+    assert (found.quantities, found.unread) == (("q", "move"), ())
+
+
 def test_joints_may_be_called_as_columns_of_the_tool_are(tmp_path: Path) -> None:
     found = opened(tmp_path, "t,y,x\n0,1,2\n", ["x", "y"])
     assert found.whole().q.tolist() == [[2.0, 1.0]]

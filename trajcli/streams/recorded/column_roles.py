@@ -161,10 +161,9 @@ class _Assignment:
         for quantity in JOINT_QUANTITIES[1:]:
             if self._mapping.get(quantity, "").lower() != NONE:
                 self._derivative(quantity, positions)
-        time = self._time()
+        time, move = self._time(), self._move()
         keys = self._ordered(positions)
         joints = {quantity: tuple(found[key] for key in keys) for quantity, found in self._chosen.items()}
-        move = self._move()
         names, fixed = self._joint_names(keys)
         used = {time, move, *fixed, *(index for found in joints.values() for index in found)}
         rest = tuple(name for index, name in enumerate(self._file.names) if index not in used)
