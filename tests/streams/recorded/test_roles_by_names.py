@@ -49,6 +49,7 @@ def test_which_columns_are_taken(names: str, columns: str | None, wanted: dict[s
     [
         ("t,actual_q_1,target_q_1", None, "the positions are ambiguous", "--columns q=actual_q or --columns q=target_q"),
         ("t,q1,q2,qd1", None, "2 positions (q1, q2), but 1 of qd (qd1)", "--columns qd=none leaves these out"),
+        ("t,q1,q2,a", "qd=none,qd2=a", "2 positions (q1, q2), but 1 of qd (a)", "--columns qd=none leaves these out"),
         ("t,q1,q3", None, "the positions are q1, q3: q2 is missing", "joints are numbered from 0 or from 1"),
         ("t,q2,q3", None, "the positions are q2, q3: q1 is missing", "joints are numbered from 0 or from 1"),
         ("t,q1,vel1,speed1", None, "two sets of columns are qd: vel1 or speed1", "--columns qd=vel or --columns qd=speed"),

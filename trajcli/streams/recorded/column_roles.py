@@ -159,7 +159,7 @@ class _Assignment:
                 self._map(key, value)
         positions = self._positions()
         for quantity in JOINT_QUANTITIES[1:]:
-            if self._mapping.get(quantity, "").lower() != NONE:
+            if quantity in self._chosen or self._mapping.get(quantity, "").lower() != NONE:
                 self._derivative(quantity, positions)
         time, move = self._time(), self._move()
         keys = self._ordered(positions)
