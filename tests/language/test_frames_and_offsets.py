@@ -11,8 +11,10 @@ from tiers import few
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.dump import dump_job
+from trajcli.job.inline import inline_target
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.language.targets import Target, ik_target
+from trajcli.units import Units
 
 HEAD = "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\nbase: {xyz: [10, 20, 300], rpy: [5, -10, 70]}\n"
 FRAMES = """\
@@ -353,12 +355,25 @@ def test_targets_fix_what_they_say_and_leave_the_rest_free() -> None:
         ik_target(points["f"])
 
 
-@pytest.mark.parametrize("frame", AXES)
+@pytest.mark.parametrize("frame", [*AXES, ""])
 def test_a_whole_matrix_in_a_frame_has_its_position_there(frame: str) -> None:
     rows = "[[0, -1, 0, 7], [1, 0, 0, 8], [0, 0, 1, 9 cm], [0, 0, 0, 1]]"
-    job = read(f"  p: {{in: {frame}, matrix: {rows}}}\n  q: {{from: p, offset: {{xyz: [0, 0, 1]}}}}\n")
-    expected = AXES[frame] @ pose(euler(0, 0, 90), 7, 8, 90)
+    where = f"in: {frame}, " if frame else ""
+    job = read(f"  p: {{{where}matrix: {rows}}}\n  q: {{from: p, offset: {{xyz: [0, 0, 1]}}}}\n")
+    expected = AXES[frame or "world"] @ pose(euler(0, 0, 90), 7, 8, 90)
     for each in (job, again(job)):
         np.testing.assert_allclose(each.job.points["p"].full_pose(), expected, atol=1e-15)
         above = expected @ pose(Rotation.identity(), 0, 0, 1)
         np.testing.assert_allclose(each.job.points["q"].full_pose(), above, atol=1e-15)
+
+
+def test_joints_beside_a_pose_that_is_asked_for_are_some_by_name() -> None:
+    robot = read("  j: {joints: 0}\n").robot
+    text = "{xyz: [1, 2, 3], joints: JOINTS}"
+    asked = inline_target(text.replace("JOINTS", "{elbow_joint: 30}"), "--pose", Units("deg", "mm"), robot)
+    assert asked.pins == pytest.approx({2: np.radians(30)})
+    for joints in ("[1, 2, 3, 4, 5, 6]", "3", str(dict.fromkeys(robot.joint_names, 1)).replace("'", "")):
+        with pytest.raises(InputError, match="beside a pose `joints` pins some joints by name"):
+            inline_target(text.replace("JOINTS", joints), "--pose", Units("deg", "mm"), robot)
+    with pytest.raises(InputError, match="the target fixes nothing"):
+        inline_target("{joints: {elbow_joint: 30}}", "--pose", Units(), robot)

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text, load_job
+from trajcli.language.targets import Target
 from trajcli.planners.waypoints.spline import Spline
 
 JOB = """\
@@ -57,3 +58,10 @@ def test_files_are_found_beside_the_job_whatever_its_folder_is_called(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rows.csv").write_text("q1,q2\n7,7\n")
     assert load_job(f"{folder}/job.yaml").job.start.joints == (0.1, 0.2)
+
+
+def test_only_a_job_has_frames_and_points_in_files() -> None:
+    with pytest.raises(ValidationError, match="only a job has frames"):
+        Target.model_validate({"xyz": [0, 0, 1], "in": "cell"})
+    with pytest.raises(ValidationError, match="only a job can read a file of points"):
+        Spline.model_validate({"through": {"csv": "rows.csv"}})

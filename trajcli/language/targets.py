@@ -173,10 +173,6 @@ class PoseFields(Model):
         if len(given) > 1:
             text = f"{given[0]} and {given[1]} exclude each other"
             raise refuse([((given[1],), text, "leave one of them out")])
-        if self.matrix is not None and len(self.matrix) == 4 and self.xyz is not None:
-            raise refuse(
-                [(("xyz",), "a 4x4 matrix already has a position", "leave xyz out, or give a 3x3 matrix")]
-            )
         if given and given[0] in ROTATIONS:
             try:
                 self.full_pose()
