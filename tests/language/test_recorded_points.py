@@ -123,6 +123,10 @@ def test_poses_begin_where_the_tool_is_within_nine_decimals() -> None:
         np.testing.assert_array_equal(poses.after(at).positions[-len(expected) :], expected)
         assert len(poses.after(at).positions) == len(expected) + (not stands)
     assert not RecordedPoses(at[None]).begins_at(at)
+    steps = at + np.outer([0, 1, 2, 3, 3.001], [0, 1, 0])
+    for first in (0, 1):  # the start itself among them, or not
+        for points in (RecordedPoses(steps[first:], merge=0.01), Recorded(steps[first:], merge=(0.01,) * 3)):
+            np.testing.assert_array_equal(points.after(at).positions, steps[[1, 2, 4]])
     turned = RecordedPoses(np.array([at, other]), np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]])).after(at)
     assert turned.quaternions is not None
     assert turned.quaternions.tolist() == [[0, 1, 0, 0]]

@@ -95,6 +95,7 @@ LAWS = [  # default, own, what holds: shape, speed, acceleration, duration
     ("{speed: 9}", "{acceleration: 5}", ("time_optimal", 0.009, 0.005, None)),
     ("{speed: 9, acceleration: 5}", "{speed: 3}", ("time_optimal", 0.003, 0.005, None)),
     ("{speed: 9}", "{shape: cubic, speed: 3}", ("cubic", 0.003, None, None)),
+    ("{speed: 9, acceleration: 5}", "{shape: cubic, speed: 3}", ("cubic", 0.003, None, None)),
     ("{speed: 9}", "{shape: cubic, duration: 3}", ("cubic", None, None, 3)),
     ("{acceleration: 9}", "{duration: 3}", ("trapezoid", None, None, 3)),
     ("{shape: cubic, duration: 7}", None, ("cubic", None, None, 7)),
@@ -186,3 +187,11 @@ def test_words_that_are_no_names_stay_as_they_are() -> None:
     for move in moves_of(text, points):
         assert (move.label, move.at[0].signal, move.to.euler.frame) == ("other", "other", "current")
     assert len({id(move) for move in moves_of(text, points)}) == 1
+
+
+def test_defaults_hold_for_both_parts_of_a_line_with_an_approach() -> None:
+    for text, speeds in (("", [9, 9]), (", law: {speed: 4}", [4, 9])):
+        move = f"{{planner: line, to: pose, approach: {{distance: 40}}{text}}}"
+        parts = moves_of(f"defaults: {{law: {{speed: 9}}, orientation: fixed}}\nmoves: [{move}]\n")
+        assert [part.law.speed * 1e3 for part in parts] == pytest.approx(speeds)
+        assert [part.orientation for part in parts] == ["fixed", "fixed"]

@@ -166,9 +166,7 @@ def _zone(given: Node) -> dict[str, Node]:
 
 def _is_added_to(key: str, own: Node) -> bool:
     """Return whether what a move says is completed from the defaults."""
-    if not isinstance(own.value, dict) or key == "orientation":
-        return False
-    return key != "law" or not any(name in own.value for name in _ALONE)
+    return isinstance(own.value, dict) and (key != "law" or own.value.keys().isdisjoint(_ALONE))
 
 
 def _mapping(like: Node, fields: Mapping[str, Node]) -> Node:
