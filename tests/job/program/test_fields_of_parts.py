@@ -195,3 +195,49 @@ def test_defaults_hold_for_both_parts_of_a_line_with_an_approach() -> None:
         parts = moves_of(f"defaults: {{law: {{speed: 9}}, orientation: fixed}}\nmoves: [{move}]\n")
         assert [part.law.speed * 1e3 for part in parts] == pytest.approx(speeds)
         assert [part.orientation for part in parts] == ["fixed", "fixed"]
+
+
+MANY = """\
+  slot: {grid: {from: pose, steps: [{count: 2, xyz: [10, 0, 0]}], frame: side}}
+  above: {from: slot, offset: {xyz: [0, 0, 5]}, frame: world}
+  pick: [above, pose]
+  "slot 1 of 2, side 1 of 2": {xyz: [7, 7, 7], rpy: [180, 0, 0]}
+  "slot (slot 1 of 2, side 1 of 2)": {xyz: [8, 8, 8], rpy: [180, 0, 0]}
+frames: {left: {}, right: {rpy: [0, 0, 90]}, side: [left, right]}
+"""
+
+
+def places(moves: str) -> list[list[float]]:
+    return [(move.to.full_pose()[:3, 3] * 1e3).round(6).tolist() for move in moves_of(moves, HEAD + MANY)]
+
+
+def test_a_grid_along_axes_that_are_many_differs_with_them() -> None:
+    inner = "moves: [{repeat: slot, moves: [{planner: quintic, to: slot}]}]"
+    expected = [[450, 100, 300], [460, 100, 300], [450, 100, 300], [450, 110, 300]]
+    assert places(f"moves: [{{repeat: side, {inner}}}]\n") == expected
+    with pytest.raises(InputError, match="'slot' differs from round to round of side"):
+        places(f"{inner}\n")
+
+
+def test_a_list_of_names_that_are_many_means_those_of_its_round() -> None:
+    inner = "moves: [{repeat: pick, moves: [{planner: quintic, to: pick}]}]"
+    text = f"moves: [{{repeat: side, moves: [{{repeat: slot, {inner}}}]}}]\n"
+    pose = [450, 100, 300]
+    expected = [[450, 100, 305], pose, [460, 100, 305], pose, [450, 100, 305], pose, [450, 110, 305], pose]
+    assert places(text) == expected
+
+
+def test_points_that_are_called_as_those_of_a_round_stay_what_they_are() -> None:
+    own = [
+        f'{{planner: quintic, to: "{name}"}}'
+        for name in ("slot 1 of 2, side 1 of 2", "slot (slot 1 of 2, side 1 of 2)")
+    ]
+    text = f"moves: [{{repeat: side, moves: [{{repeat: slot, moves: [{{planner: quintic, to: slot}}]}}]}}, {', '.join(own)}]\n"
+    assert places(text)[0] == [450, 100, 300]
+    assert places(text)[4:] == [[7, 7, 7], [8, 8, 8]]
+    loaded = job_from_text(f"{HEAD}{MANY}{text}")
+    assert [loaded.ends(index) for index in (1, 4, 5)] == [
+        "slot -> slot",
+        "slot -> slot 1 of 2, side 1 of 2",
+        "slot 1 of 2, side 1 of 2 -> slot (slot 1 of 2, side 1 of 2)",
+    ]

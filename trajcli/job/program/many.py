@@ -227,7 +227,7 @@ class ManyNames:
         first = dict.fromkeys(self.counts, 0)
         reached = {path for made in self.made.values() for _, path in made.values()}
         for name, (path, _) in self._at.items():
-            if self.needs(name) and path not in reached:
+            if path not in reached:
                 self.meant(name, first)
 
     def named(self, section: str) -> dict[str, Node]:
