@@ -178,15 +178,40 @@ def test_names_that_are_many_are_found_under_every_key_that_names_points(move: s
 
 def test_words_that_are_no_names_stay_as_they_are() -> None:
     """A label, a signal and the frame of Euler angles may be called as a point that is many."""
-    points = HEAD.replace("  taught", "  current: {xyz: [1, 2, 3]}\n  other: [current, pose]\n  taught")
+    points = HEAD.replace("  taught", "  one: {xyz: [1, 2, 3]}\n  current: [one, pose]\n  taught")
     text = (
-        "moves:\n  - repeat: other\n    moves:\n"
+        "moves:\n  - repeat: current\n    moves:\n"
         "      - {planner: quintic, to: {xyz: [1, 2, 3], euler: {sequence: ZYZ, frame: current, angles: [1, 2, 3]}}, "
-        "label: other, at: {signal: other, value: 1}}\n"
+        "label: current, at: {signal: current, value: 1}}\n"
     )
     for move in moves_of(text, points):
-        assert (move.label, move.at[0].signal, move.to.euler.frame) == ("other", "other", "current")
+        assert (move.label, move.at[0].signal, move.to.euler.frame) == ("current", "current", "current")
     assert len({id(move) for move in moves_of(text, points)}) == 1
+
+
+def steps(*counts: str) -> int:
+    listed = ", ".join(f"{{count: {count}, xyz: [1, 0, 0]}}" for count in counts)
+    points = f"{HEAD}  slot: {{grid: {{from: pose, steps: [{listed}]}}}}\n"
+    return len(moves_of("moves: [{repeat: slot, moves: [{planner: quintic, to: slot}]}]\n", points))
+
+
+def test_counts_of_grids_are_whole_numbers_of_at_least_one() -> None:
+    assert (steps("1"), steps("1", "1"), steps("2", "1", "3")) == (1, 1, 6)
+    for count in ("0", "-1", "2.0", "true", "'2'", "null"):
+        with pytest.raises(InputError, match="expected a whole number of at least 1"):
+            steps("2", count)
+    with pytest.raises(InputError, match="a grid of 4000000 places, expected at most 1000000"):
+        steps("2000", "2000")
+
+
+def test_rounds_by_number_are_at_least_one() -> None:
+    move = "moves: [{planner: quintic, to: pose}]"
+    assert (
+        len(moves_of(f"moves: [{{repeat: 1, {move}}}, {{repeat: 2, moves: [{{repeat: 3, {move}}}]}}]\n")) == 7
+    )
+    for count in ("0", "-1", "1.0", "true", "[]"):
+        with pytest.raises(InputError):
+            moves_of(f"moves: [{{repeat: {count}, {move}}}]\n")
 
 
 def test_defaults_hold_for_both_parts_of_a_line_with_an_approach() -> None:

@@ -21,7 +21,6 @@ SECTIONS = ("points", "frames")
 _LENGTH = Quantity("length")
 _NAMING = ("to", "via", "line", "in", "from", "frame")
 """Keys whose text names a point or a frame; so do the texts of a list under `through`."""
-_OTHER_TEXTS = ("euler", "configuration", "label", "planner", "signal", "tool")
 
 _OF_MOVES = ("zone", "law", "limits", "at", "duration", "tolerance", "orientation", "approach", "retreat")
 """Keys of moves, which no repeat has."""
@@ -329,7 +328,7 @@ def naming_texts(node: Node, key: str | int = "to") -> Iterator[str]:
             yield from naming_texts(item, "to" if key == "through" else "")
     elif isinstance(node.value, dict):
         for name, below in node.value.items():
-            if name not in _OTHER_TEXTS:
+            if name != "euler":  # whose frame is none of these
                 yield from naming_texts(below, name)
 
 
@@ -344,7 +343,7 @@ def _with_names(node: Node, key: str, meant: Callable[[str], str]) -> Node:
         return node if same else node._replace(value=items)
     if isinstance(node.value, dict):
         below = {
-            name: item if name in _OTHER_TEXTS else _with_names(item, name, meant)
+            name: item if name == "euler" else _with_names(item, name, meant)
             for name, item in node.value.items()
         }
         return node if all(below[name] is node.value[name] for name in below) else node._replace(value=below)
