@@ -25,10 +25,11 @@ def job(
 
 
 def both(loaded: LoadedJob) -> list[LoadedJob]:
-    """Return a job and what its resolved form is read as where plain numbers are in rad and m."""
+    """Return a job and what its resolved form is read as, also where plain numbers are in rad and m."""
     text = dump_job(loaded)
     assert "angle: deg, length: mm" in text
-    return [loaded, job_from_text(text.replace("angle: deg, length: mm", "angle: rad, length: m"))]
+    in_si = text.replace("angle: deg, length: mm", "angle: rad, length: m")
+    return [loaded, job_from_text(text), job_from_text(in_si)]
 
 
 BOUNDS = [  # as written, (lower, upper) of each joint in deg and mm
@@ -253,7 +254,7 @@ def test_efforts_of_a_move_are_those_of_its_joints_again_in_the_resolved_job() -
         limits = each.job.moves[0].limits
         assert limits is not None
         assert limits.effort == ((-INF, INF), (-5, 100))
-    (same,) = (
+    same, _ = (
         each.job.moves[0].limits for each in both(job("{}", HEAVY, moves.replace(", turn: null", "")))[1:]
     )
     assert same is not None

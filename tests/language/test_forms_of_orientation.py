@@ -60,7 +60,7 @@ def test_every_form_is_the_rotation_of_scipy(unit: str, form: str) -> None:
     text = head + "".join(f"{key}: {json.dumps(item)}\n" for key, item in plain.items())
     job = job_from_text(text + MOVES)
     again = job_from_text(dump_job(job).replace("angle: deg, length: mm", "angle: rad, length: m"))
-    for each in (job, again):
+    for each in (job, again, job_from_text(dump_job(job))):
         for read in (each.robot.tool, each.robot.base, each.job.points["p"].full_pose()):
             np.testing.assert_allclose(read, expected, rtol=1e-15, atol=3e-15)
     assert np.array_equal(job.job.points["p"].full_pose(), again.job.points["p"].full_pose())

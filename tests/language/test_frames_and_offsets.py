@@ -53,7 +53,14 @@ def read(points: str, moves: str = MOVES) -> LoadedJob:
 
 
 def again(job: LoadedJob) -> LoadedJob:
-    return job_from_text(dump_job(job).replace("{angle: deg, length: mm}", "{angle: rad, length: m}"))
+    """Return what the resolved job is read as, which its points are in rad and m, too."""
+    text = dump_job(job)
+    same = job_from_text(text)
+    assert (
+        job_from_text(text.replace("{angle: deg, length: mm}", "{angle: rad, length: m}")).job.points
+        == same.job.points
+    )
+    return same
 
 
 OFFSET = pose(euler(4, -5, 6), 1, -2, 3)

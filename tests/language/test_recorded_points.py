@@ -9,6 +9,7 @@ import pytest
 from tiers import few
 
 from trajcli.errors import InputError
+from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
 from trajcli.language.recorded import Recorded, RecordedPoses
 
@@ -183,6 +184,8 @@ def test_wrong_tables_are_refused_where_they_are_wrong(through: str, message: st
 
 def test_times_of_a_table_are_times_in_any_unit() -> None:
     text = "{positions: [[1, 2], {j2: 90, j1: -1}], times: [500 ms, 0.1 min]}"
-    (move,) = job_from_text(f"{HEAD}  - {{planner: spline, through: {text}}}\n").job.moves
+    job = job_from_text(f"{HEAD}  - {{planner: spline, through: {text}}}\n")
+    (move,), (same,) = job.job.moves, job_from_text(dump_job(job)).job.moves
+    assert move.through == same.through  # type: ignore[attr-defined]
     assert move.through.times.tolist() == [0.5, 6.0]  # type: ignore[attr-defined]
     assert np.degrees(move.through.positions).ravel() == pytest.approx([1, 2, -1, 90])  # type: ignore[attr-defined]

@@ -24,10 +24,11 @@ def job(more: str = "", moves: str = HOLD, head: str = HEAD) -> LoadedJob:
 
 
 def both(loaded: LoadedJob) -> list[LoadedJob]:
-    """Return a job and what its resolved form is read as where plain numbers are in rad and m."""
+    """Return a job and what its resolved form is read as, also where plain numbers are in rad and m."""
     text = dump_job(loaded)
     assert "{angle: deg, length: mm}" in text
-    return [loaded, job_from_text(text.replace("{angle: deg, length: mm}", "{angle: rad, length: m}"))]
+    in_si = text.replace("{angle: deg, length: mm}", "{angle: rad, length: m}")
+    return [loaded, job_from_text(text), job_from_text(in_si)]
 
 
 INERTIA = "inertia: [0.3, 0.4, 0.5, 0.01, -0.02, 0.03]"
@@ -73,7 +74,7 @@ def test_tools_by_name_and_in_place(
                 np.testing.assert_allclose(found.load.com, com, rtol=1e-15)
                 np.testing.assert_array_equal(found.load.inertia, inertia)
             np.testing.assert_allclose(each.robot.tool, pose, atol=1e-16)
-    (light, again) = (each.job.tool for each in both(job("tools: {grip: {xyz: [1, 2, 3]}}\ntool: grip\n")))
+    light, again, _ = (each.job.tool for each in both(job("tools: {grip: {xyz: [1, 2, 3]}}\ntool: grip\n")))
     assert light is not None
     assert again is not None
     assert (light.load, again.load, again.name) == (None, None, "grip")
