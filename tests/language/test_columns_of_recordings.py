@@ -49,6 +49,8 @@ def test_columns_say_joint_and_unit_whatever_the_units_of_the_job(
 def test_beside_columns_of_joints_those_of_the_tool_are_not_joints_of_such_names(tmp_path: Path) -> None:
     rows = "q1,q2,x,y\n1,2,8,9\n3,4,8,9\n"
     assert recorded(tmp_path, rows, SLIDES).positions.tolist() == [[1, 2], [3, 4]]
+    with pytest.raises(InputError, match="two columns for x: x and x_mm"):
+        recorded(tmp_path, "x,x_mm,y\n1,2,3\n", SLIDES)
     alone = "x_mm,y\n8,9\n7,6\n"
     assert recorded(tmp_path, alone, SLIDES).positions.tolist() == [[0.008, 9], [0.007, 6]]
 
