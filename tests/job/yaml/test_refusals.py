@@ -182,6 +182,12 @@ def test_every_duplicate_key_is_reported_with_the_line_of_the_first() -> None:
     ]
 
 
+def test_a_key_stands_twice_also_where_one_of_them_is_empty() -> None:
+    for text in ("a:\na: 1\n", "a: ~\na: 1\n", "a: 1\na:\n", "a:\n'a':\n", "{a, a: 1}\n"):
+        (problem,) = refused(text)
+        assert "the key 'a' already stands in" in problem.message
+
+
 def test_all_problems_come_at_once_in_the_order_of_the_file() -> None:
     problems = refused(START + "version: 2\na: .nan\nb: &x 1\nc: *x\n2: 1\nd: {e:1}\nf: [1\n")
     assert [p.place.line for p in problems if p.place] == [2, 3, 4, 5, 6, 7, 8]
