@@ -194,6 +194,11 @@ def test_all_problems_come_at_once_in_the_order_of_the_file() -> None:
     assert "never closed" in problems[-1].message
 
 
+def test_a_tab_is_said_behind_what_stands_before_it() -> None:
+    problems = refused("a: 1\na: 2\nb: [1,\n\t2]\nb: 3\n")
+    assert [p.place.line for p in problems if p.place] == [2, 4, 5]
+
+
 def test_words_of_yaml_1_1_and_quoted_signs_are_plain_text() -> None:
     text = '"<<": 1\n"1": x\nyes: on\nt: 1:30\nu: a:b\nq: "*x &y !z"\nv: [x y, a#b]\nw: "\\x00\\e"\nz:\t1\t# tab\n'
     assert parse_document(START + text, "f").plain() == {
