@@ -26,7 +26,6 @@ from trajcli.planners.tool_constraint import KnownTool
 _SAMPLES = 9  # of a path, its ends included
 _BEND = 0.9  # of an acceleration, or of a jerk, that a bend of the path may take
 _LEFT = 0.1  # of a jerk that is left for the law
-_TINY = 1e-12  # of the largest derivative: less is rounding
 
 
 BoundsAbout = Callable[[Array], Array]
@@ -177,7 +176,7 @@ def law_bounds(rates: PathRates, limits: Limits, tcp: ToolLimits) -> BoundsAbout
     first, second, third = rates.joints
     low, high = limits.acceleration.T
     jerk = np.abs(limits.jerk).min(axis=1)
-    size = np.where(np.abs(first) > _TINY * np.abs(first).max(), np.abs(first), 0.0)
+    size = np.abs(first)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         top = _largest_speed(rates, limits, tcp, size)
     sign = np.where(first > 0, 1.0, -1.0)

@@ -48,6 +48,8 @@ MISSING = [
         "angular_speed",
     ),
     (line(law={"duration": 3}), ("acceleration", "angular_acceleration"), "acceleration"),
+    (line(law={"deceleration": 1}), ("acceleration", "angular_acceleration"), "acceleration"),
+    (line(law={"deceleration": 1, "duration": 3}), ("acceleration", "angular_acceleration"), "acceleration"),
     (
         line({"rpy": [np.pi, 0, 0.8]}, law={"duration": 3, "speed": 0.1}),
         ("angular_acceleration",),

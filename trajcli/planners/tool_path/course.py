@@ -51,7 +51,7 @@ class ToolCourse(Course):
     @property
     def limits_tool(self) -> bool:
         """Whether something limits the tool along it."""
-        return self.joints.path.speeds is not None or self.deceleration < math.inf or super().limits_tool
+        return self.joints.path.speeds is not None or super().limits_tool
 
     @property
     def deceleration(self) -> float:

@@ -386,7 +386,7 @@ def law_bounds(
     if not spec.time_law.has_ramps or math.isfinite(named.speed):
         return named, None
     named = named.with_each(bounds, lambda own, other: own if math.isfinite(own) else other)
-    if math.isinf(named.by_order[1]):
+    if math.isinf(named.acceleration):
         raise _missing(["acceleration"], derivatives, planner, spec)
     return replace(named, speed=math.inf), None
 
@@ -430,8 +430,7 @@ def _or(value: float | None, other: float) -> float:
 
 def _require(spec: LawSpec, bounds: PathBounds, derivatives: PathDerivatives, planner: str) -> None:
     """Refuse bounds that lack one that the fastest law of this shape needs."""
-    named = zip(("speed", "acceleration", "jerk"), bounds.by_order, strict=True)
-    lacking = [name for name, bound in named if name in spec.time_law.needs and math.isinf(bound)]
+    lacking = [name for name in spec.time_law.needs if math.isinf(getattr(bounds, name))]
     if not lacking and all(map(math.isinf, bounds.by_order)):
         lacking = ["speed"]
     if lacking:

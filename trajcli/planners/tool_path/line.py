@@ -88,7 +88,7 @@ class ScrewMove(ToolPathMove):
             message = "a screw needs the whole orientation of its target"
             raise InputError(message, hint="give `rpy`, `quat_wxyz`, `matrix`, `axis_angle` or `euler`")
         screw = Screw(before, target.pose)
-        if screw.pure_rotation and screw.length <= _SAME_ANGLE:
+        if screw.length <= _SAME_ANGLE:
             return _path_of_no_length(before, target, self.to)
         return path_of_poses(screw, target, self.to)
 
