@@ -20,6 +20,7 @@ from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Limits, ToolLimits
 from trajcli.planners.course import Course, PathRates, law_bounds
 from trajcli.planners.joint_course import JointCourse, joint_line
+from trajcli.planners.tool_constraint import ToolJerkConstraint
 from trajcli.planners.tool_path.course import ToolCourse
 from trajcli.planning.plan import plan_job
 
@@ -169,6 +170,36 @@ def test_what_limits_the_tool_limits_laws_along_a_course() -> None:
         joint_line(middle, middle + 0.1, robot).curve
     )
     assert np.isfinite(approach.rows(np.array([0.5]), "left").cap).all()
+
+
+def test_the_tool_of_a_path_of_joints_has_the_derivatives_of_either_side_of_a_break() -> None:
+    """One that bends at s = 1, and an acceleration of the tool along its path as well as across."""
+    pieces = np.array([[[0.4, 0.0], [-0.8, 0.6]], [[1.0, 0.5], [1.0, -0.5]], [[0.1, 1.0], [1.5, 1.5]]])
+    course = JointCourse(PiecewisePolynomial(np.array([0.0, 1.0, 2.0]), pieces), bent(acceleration=2.0).robot)
+    assert course.curve.evaluate(np.array([1.0 - 1e-12]))[0] == pytest.approx([1.5, 1.5])
+    at, h = np.array([1.0]), 1e-4
+    for side, sign in (("left", -1), ("right", 1)):
+        places = forward(course.robot, course.curve.evaluate(1.0 + sign * h * np.arange(4)))[:, :3, 3]
+        first = sign * (-11 * places[0] + 18 * places[1] - 9 * places[2] + 2 * places[3]) / (6 * h)
+        second = (2 * places[0] - 5 * places[1] + 4 * places[2] - places[3]) / h**2
+        _, one, two = course.tool.evaluate(at, side)
+        assert one[0, :3] == pytest.approx(first, abs=1e-5)
+        assert two[0, :3] == pytest.approx(second, abs=1e-3)
+        orders = course.tool.derivatives(at, side)
+        assert orders[:2, 0, 0] == pytest.approx(np.stack([one[0, :3], two[0, :3]]))
+        rows = course.tool_constraint().rows(at, side)
+        for change, square in ((0.0, 1.0), (0.7, 0.3), (-0.7, 0.3), (-2.0, 1.0)):
+            size = np.linalg.norm(first * change + second * square)
+            used = (rows.a * change + rows.b * square)[np.isfinite(rows.c)].max()
+            assert size * np.cos(np.pi / 16) - 1e-3 <= used <= size + 1e-3
+
+
+@pytest.mark.parametrize("name", ["jerk", "angular_jerk"])
+def test_either_jerk_of_the_tool_limits_a_path_of_joints(name: str) -> None:
+    assert bent(speed=1.0).jerk_constraints == ()
+    (constraint,) = bent(**{name: 3.0}).jerk_constraints
+    assert isinstance(constraint, ToolJerkConstraint)
+    assert constraint.jerk == ((3.0, np.inf) if name == "jerk" else (np.inf, 3.0))
 
 
 def course_of(move: dict[str, Any], **limits: Any) -> ToolCourse:
