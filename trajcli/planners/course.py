@@ -143,9 +143,9 @@ class Course(ABC):
 
         They are the geometric means of those at some s, exact where they are the same everywhere.
         """
-        known = self._typical_bounds.get((low, high))
-        if known is not None:
-            return known
+        found = self._typical_bounds.get((low, high))
+        if found is not None:
+            return found
         some = np.linspace(low, high, 1 if self.uniform else _SAMPLES).tolist()
         rows = np.concatenate([self.bounds(self.rates(np.array([s])))(np.zeros((1, 2))) for s in some])
         sizes = np.abs(rows)

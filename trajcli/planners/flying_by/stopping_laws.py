@@ -79,8 +79,8 @@ class StoppingLaws:
             first, last = chain.stretch(index)
             slower = slower[:1] if s - first <= last - s else slower[1:]
         for border in slower:
-            known = self._mixtures.get(border)
-            fast = states[border + 1] if known is None else known.fast
+            earlier = self._mixtures.get(border)
+            fast = states[border + 1] if earlier is None else earlier.fast
             self._mixtures[border] = _Mixture(self._level(border) + 1, fast)
 
     def slow_all(self, chain: FlyByChain) -> bool:
@@ -140,8 +140,8 @@ class StoppingLaws:
         begun, ended = times_at(law, np.array([first, last])).tolist()
         curves = []
         for curve in (whole.curve, law):
-            rest = cut(curve, begun)[1] if first > 0 else curve
-            some = cut(rest, ended)[0] if last < course.length else rest
+            after = cut(curve, begun)[1] if first > 0 else curve
+            some = cut(after, ended)[0] if last < course.length else after
             curves.append(scale_time(some.shifted(-some.start), 1 / self._pace(chain, index)))
         return FlownPart(curves[0], course.reference(curves[1]), curves[1])
 

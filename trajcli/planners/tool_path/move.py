@@ -254,8 +254,8 @@ class ToolPathMove(Planner):
             return fastest_along(followed(robot, path, start), self.law, tolerance, self.tag)
         joints = None if path.orientation == "all" else followed(robot, path, start)
         with nullcontext() if joints is None else joints.diagnosed():
-            known = path if joints is None else joints.executed
-            law, ruled_by = law_along(known, self.law, robot.limits.tcp, self.tag)
+            led = path if joints is None else joints.executed
+            law, ruled_by = law_along(led, self.law, robot.limits.tcp, self.tag)
         motion = motion_along(path, law.law, law.breaks, tolerance, ruled_by)
         return JointMotion((joints or followed(robot, path, start)).by_time(motion), motion, law.phases)
 
@@ -471,13 +471,13 @@ def _even_in_angles(
         message = f"orientation: euler goes evenly in the target's angles, and the targets have {what}"
         raise InputError(message, hint="give each target `euler` of one sequence, or `rpy`")
     sequence, frame = forms.pop()
-    known = [None, *(None if target.typed is None else target.typed[0] for target in targets)]
+    angles = [None, *(None if target.typed is None else target.typed[0] for target in targets)]
     first = None if origin is None else _typed(origin)
     started = None if first is None or first[1:] != (sequence, frame) else first[0]
-    if beyond_half_a_turn([started, *known]):
-        nearest = next(row for row in known if row is not None)
-        known[0] = angles_to_count_from(rotations[0], sequence, frame, nearest, started)  # type: ignore[arg-type]
-    return euler_interpolation(rotations, progress, sequence, frame, known)  # type: ignore[arg-type]
+    if beyond_half_a_turn([started, *angles]):
+        nearest = next(row for row in angles if row is not None)
+        angles[0] = angles_to_count_from(rotations[0], sequence, frame, nearest, started)  # type: ignore[arg-type]
+    return euler_interpolation(rotations, progress, sequence, frame, angles)  # type: ignore[arg-type]
 
 
 def path_to(

@@ -1,0 +1,153 @@
+"""What a move along a path says of itself: durations, speeds that are wanted, phases, joins, and what it refuses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from tool_jobs import DOWN, LIMITS, START, TCP, line, plan, planned, poses_of, refusal, rows
+
+HERE = np.array([0.4, 0.1, 0.05])
+UP = {"xyz": rows(HERE + np.array([0.0, 0.0, 0.1]))}
+TURN = {"rpy": [np.pi, 0, 0.8]}
+
+
+def turned(roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Return Rz Ry Rx."""
+    (a, b, c), (d, e, f) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
+    x, y = [[1, 0, 0], [0, a, -d], [0, d, a]], [[b, 0, e], [0, 1, 0], [-e, 0, b]]
+    return np.array([[c, -f, 0], [f, c, 0], [0, 0, 1]]) @ y @ x
+
+
+def only(move: dict[str, Any], **rest: Any) -> Any:
+    """Return the move of a job that has no other."""
+    return planned("ur5e", START, move, **rest).moves[0]
+
+
+@pytest.mark.parametrize(
+    ("law", "names", "joins", "given"),
+    [
+        ({}, ["duration", "minimum_duration"], 1, None),
+        ({"shape": "quintic"}, ["duration", "minimum_duration"], 2, None),
+        ({"duration": 2.5}, ["duration"], 1, 2.5),
+        ({"minimum_duration": 2.5}, ["minimum_duration"], 1, None),
+        ({"speed": 0.1, "acceleration": 1.0}, ["minimum_duration"], 1, None),
+        ({"shape": "time_optimal"}, ["minimum_duration"], 1, None),
+    ],
+)
+def test_a_move_knows_what_its_law_may_be_given_to_last_longer(
+    law: dict[str, Any], names: list[str], joins: int, given: float | None
+) -> None:
+    planner = only(line(UP, law=law), limits={**LIMITS, "velocity": 60.0}).planner
+    said = dict(planner.lasting(3.0))
+    assert [text.split(":")[0].strip("`") for text in said] == names
+    for name, (text, longer) in zip(names, said.items(), strict=True):
+        assert text == f"`{name}: 3` under `law`"
+        assert getattr(longer.law, name) == 3.0
+    assert planner.joins == joins
+    free = planner.without_duration()
+    assert (None if free is None else (free[0], free[1].law.duration)) == (
+        None if given is None else (given, None)
+    )
+    fixed = [name for name in ("duration", "minimum_duration") if name in law]
+    assert planner.why_not_flown_by == (f"its law has a `{fixed[0]}`" if fixed else None)
+
+
+@pytest.mark.parametrize(("name", "lasts"), [("duration", 1.5), ("minimum_duration", 1.5), ("speed", 0.0)])
+def test_a_move_of_no_length_lasts_what_its_law_says(name: str, lasts: float) -> None:
+    hold = {"planner": "hold", "duration": 1.0}
+    made = plan("ur5e", START, hold, line({"xyz": rows(HERE)}, law={name: 1.5}))
+    assert made.trajectory.duration == pytest.approx(1.0 + lasts)
+
+
+@pytest.mark.parametrize(
+    ("to", "law", "wanted"),
+    [
+        (UP, {}, TCP["speed"]),
+        (UP, {"speed": 0.1}, 0.1),
+        (UP, {"duration": 2}, None),
+        (TURN, {}, TCP["angular_speed"]),
+        (TURN, {"angular_speed": 0.7, "speed": 0.1}, 0.7),
+    ],
+)
+def test_the_speed_that_is_wanted_is_that_of_the_law_or_the_limit(
+    to: dict[str, Any], law: dict[str, Any], wanted: float | None
+) -> None:
+    move = only(line(to, law=law))
+    assert move.planned.wanted_speed == wanted
+    assert move.planned.tool.ruled_by == (
+        None if "duration" in law else "rotation" if to is TURN else "translation"
+    )
+    assert [phase.name for phase in move.planned.phases] == ["accelerate", "cruise", "decelerate"]
+
+
+def test_where_speeds_step_none_is_wanted() -> None:
+    segments = [{"line": UP, "law": {"speed": 0.1}}, {"line": {"xyz": rows(HERE + np.array([0.1, 0, 0.1]))}}]
+    path = {"planner": "path", "corner": "stop", "segments": segments, "law": {"shape": "time_optimal"}}
+    assert only(path).planned.wanted_speed is None
+
+
+@pytest.mark.parametrize(("jerk", "continuity"), [(None, 1), (2000.0, 2)])
+def test_a_fastest_law_within_jerk_joins_accelerations(jerk: float | None, continuity: int) -> None:
+    move = only(line(UP, law={"shape": "time_optimal"}), limits={**LIMITS, "jerk": jerk})
+    assert move.planned.continuity == continuity
+    assert move.planned.events
+
+
+@pytest.mark.parametrize("name", ["velocity", "acceleration"])
+def test_a_line_neither_starts_nor_ends_in_motion(name: str) -> None:
+    (problem,) = refusal("ur5e", START, line({**UP, name: 0.1})).problems
+    assert "ends at rest" in problem.text()
+    joints = {"joints": [0.1, -1.5, 1.5, 0, 1.5, 0], name: [0, 0, 0.1, 0, 0, 0]}
+    (problem,) = refusal("ur5e", joints, line({"from": "here", "offset": {"xyz": [0, 0, 0.1]}})).problems
+    if name == "velocity":
+        assert "line starts at rest, but the velocity of elbow_joint is 0.1" in problem.text()
+    else:
+        assert problem.text() == "line cannot start with an acceleration"
+
+
+@pytest.mark.parametrize("kind", ["yaw", "pitch"])
+@pytest.mark.parametrize(("axis", "upright"), [("z", True), ("x", False)])
+def test_an_upright_axis_has_no_heading_to_turn_from(kind: str, axis: str, *, upright: bool) -> None:
+    move = line({**UP, kind: 0.1, "tool_axis": axis})
+    if upright:
+        (problem,) = refusal("ur5e", START, move).problems
+        assert "the z axis of the tool is upright" in problem.text()
+        assert f"without {kind}" in problem.advice()
+    else:
+        assert only(move).planned.curve.duration > 0
+
+
+def test_euler_goes_evenly_in_roll_pitch_and_yaw_as_well() -> None:
+    angles = np.array([np.pi - 0.4, 0.3, 0.8])
+    move = line({"xyz": rows(HERE + np.array([0, 0.1, 0.1])), "rpy": rows(angles)}, orientation="euler")
+    made = plan("ur5e", START, move)
+    poses = poses_of(made, np.array([0.0, 0.5, 1.0]) * made.trajectory.duration)
+    for pose, share in zip(poses, (0.0, 0.5, 1.0), strict=True):
+        expected = turned(*(np.array(DOWN) + share * (angles - np.array(DOWN))))
+        assert pose[:3, :3] == pytest.approx(expected, abs=1e-5)
+
+
+TWICE = [{"line": UP}, {"line": {"xyz": rows(HERE + np.array([0.1, 0, 0.1]))}}]
+
+
+@pytest.mark.parametrize(
+    ("how", "first", "last", "said"),
+    [
+        (
+            "euler",
+            {"rpy": [3, 0, 0]},
+            {"euler": {"sequence": "ZYZ", "angles": [0, 3, 0]}},
+            "different angles",
+        ),
+        ("fixed", {}, {"rpy": [np.pi, 0, 0.5]}, "keeps the orientation"),
+        ("tangent", {"rpy": [np.pi, 0, 0.5]}, {}, "follows from the path"),
+    ],
+)
+def test_every_segment_of_a_path_must_ask_for_what_its_rule_gives(
+    how: str, first: dict[str, Any], last: dict[str, Any], said: str
+) -> None:
+    segments = [{"line": {**one["line"], **aim}} for one, aim in zip(TWICE, (first, last), strict=True)]
+    path = {"planner": "path", "corner": "stop", "segments": segments, "orientation": how}
+    assert said in str(refusal("ur5e", START, path))
