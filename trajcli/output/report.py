@@ -294,21 +294,21 @@ def _outside(move: PlannedMove, verdict: Verdict, index: int) -> tuple[OutsideRe
 
 
 def _fastest(move: PlannedMove, span: Span) -> FastestReport | None:
-    known = move.planned.certificate
-    if known is None:
+    proof = move.planned.certificate
+    if proof is None:
         return None
     units, names = joint_units(move.robot.joint_types), move.robot.joint_names
-    rows = zip(names, known.off_chords.tolist(), known.off_times.tolist(), units, strict=True)
-    bounded = known.lower > 0
+    rows = zip(names, proof.off_chords.tolist(), proof.off_times.tolist(), units, strict=True)
+    bounded = proof.lower > 0
     return FastestReport(
-        lower=known.lower if bounded else None,
-        above=max(move.duration / known.lower - 1, 0.0) if bounded else None,
-        joint=None if known.joint is None else names[known.joint],
+        lower=proof.lower if bounded else None,
+        above=max(move.duration / proof.lower - 1, 0.0) if bounded else None,
+        joint=None if proof.joint is None else names[proof.joint],
         method="bounded" if bounded else "heuristic",
-        starts=len(known.found),
-        agreeing=known.agreeing,
-        found=[time if math.isfinite(time) else None for time in known.found],
-        stopping=known.stopping if math.isfinite(known.stopping) else None,
+        starts=len(proof.found),
+        agreeing=proof.agreeing,
+        found=[time if math.isfinite(time) else None for time in proof.found],
+        stopping=proof.stopping if math.isfinite(proof.stopping) else None,
         off_chords=[
             OffChordReport(joint=name, distance=off, time=span.start + time, unit=unit)
             for name, off, time, unit in rows

@@ -162,9 +162,9 @@ class MotionFile:
             for key, found in roles.joints.items()
         }
         self.quantities = (*roles.joints, *((MOVE,) if self._move is not None else ()))
-        self.unread = roles.rest
+        self.unread = roles.unread
         self._message_joints = rows.joint_names if rows.format == "ros" else None
-        self.notes = (*rows.notes, *note_of_unread(roles.rest), *scales.notes)
+        self.notes = (*rows.notes, *note_of_unread(roles.unread), *scales.notes)
         self._kept: list[Array] | None = []
         self._read_all(scales)
 

@@ -13,7 +13,7 @@ def roles(names: str, columns: str | None = None, joints: list[str] | None = Non
     listed = tuple(names.split(","))
     found = assign_roles(NamedFile("in.csv", listed, lambda name: None), columns, joints)
     taken = {key: " ".join(listed[index] for index in each) for key, each in found.joints.items()}
-    return {"t": listed[found.time], **taken, "rest": " ".join(found.rest)}
+    return {"t": listed[found.time], **taken, "rest": " ".join(found.unread)}
 
 
 @pytest.mark.parametrize(

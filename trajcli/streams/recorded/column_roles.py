@@ -48,7 +48,7 @@ class ColumnRoles:
         joint_names: n names of joints; None where the file numbers them.
         fixed: Indices of columns of text that must be the same in all rows.
         nanoseconds: Whether times without a unit are ns, as `rostopic echo -p` prints them.
-        rest: Names of the columns that are not used.
+        unread: Names of the columns that are not used.
     """
 
     time: int
@@ -58,7 +58,7 @@ class ColumnRoles:
     joint_names: tuple[str, ...] | None
     fixed: tuple[int, ...] = ()
     nanoseconds: bool = False
-    rest: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
 
     @property
     def taken(self) -> tuple[int, ...]:
@@ -101,15 +101,15 @@ def parse_mapping(text: str | Mapping[str, str] | None) -> dict[str, str]:
     pairs: Iterable[tuple[str, str, str]]
     pairs = [(k, "=", v) for k, v in text.items()] if isinstance(text, Mapping) else _pairs(text)
     mapping: dict[str, str] = {}
-    known = (TIME, *JOINT_QUANTITIES, MOVE)
+    keys = (TIME, *JOINT_QUANTITIES, MOVE)
     for key, sign, value in pairs:
         name, column = key.strip(), value.strip()
         if not sign or not name or not column:
             raise InputError(
                 f"--columns: '{key}{sign}{value}' is no mapping", hint="such as t=time,q=target_q"
             )
-        if name not in known and _JOINT_KEY.fullmatch(name) is None:
-            hint = did_you_mean(name, known) or valid_names([*known, "q1", "qd1"], "known are")
+        if name not in keys and _JOINT_KEY.fullmatch(name) is None:
+            hint = did_you_mean(name, keys) or valid_names([*keys, "q1", "qd1"], "known are")
             raise InputError(f"--columns: unknown quantity '{name}'", hint=hint)
         if name in mapping:
             raise InputError(f"--columns: {name} is mapped twice", hint="map it once")
@@ -166,8 +166,8 @@ class _Assignment:
         joints = {quantity: tuple(found[key] for key in keys) for quantity, found in self._chosen.items()}
         names, fixed = self._joint_names(keys)
         used = {time, move, *fixed, *(index for found in joints.values() for index in found)}
-        rest = tuple(name for index, name in enumerate(self._file.names) if index not in used)
-        return ColumnRoles(time, joints, move, tuple(self._names), names, fixed, self._echo, rest)
+        unread = tuple(name for index, name in enumerate(self._file.names) if index not in used)
+        return ColumnRoles(time, joints, move, tuple(self._names), names, fixed, self._echo, unread)
 
     # --columns
 
@@ -315,11 +315,9 @@ class _Assignment:
         numbers = [key for key in positions if isinstance(key, int)]
         if len(numbers) < len(positions):
             return list(positions)
-        low = min(numbers)
-        missing = sorted(set(range(min(low, 1), max(numbers) + 1)) - set(numbers))
-        if missing or low > 1:
-            stem = self._names[next(iter(positions.values()))].stem
-            number = missing[0] if missing else 1
+        missing = sorted(set(range(1, max(numbers))) - set(numbers))
+        if missing:
+            stem, number = self._names[next(iter(positions.values()))].stem, missing[0]
             named = stem.replace("*", str(number)) if "*" in stem else f"{stem}{number}"
             message = f"the positions are {self._listed(positions)}: {named} is missing"
             raise self._file.wrong(
@@ -341,8 +339,8 @@ class _Assignment:
         if names:
             choices = " or ".join(f"--columns t={name}" for name in names)
             raise self._file.wrong(f"{len(names)} columns are times: {', '.join(names)}", choices)
-        known = ", ".join(self._file.names[:_SHOWN])
-        hint = f"name it: --columns t=NAME, or `check --rate HZ` where there is none; the columns are {known}"
+        shown = ", ".join(self._file.names[:_SHOWN])
+        hint = f"name it: --columns t=NAME, or `check --rate HZ` where there is none; the columns are {shown}"
         raise self._file.wrong("no column is the time, such as t or time", hint)
 
     def _stamp(self, found: Sequence[int]) -> int:
@@ -417,8 +415,8 @@ def ordered_joints(
             none = of_message and len(missing) == len(wanted)
             more = "; rows that `trajcli convert` makes of it number them in this order" if none else ""
             raise file.wrong(f"there is no joint '{missing[0]}'", f"{hint}{more}")
-        rest = [name for name in names if name not in wanted]
-        notes = (f"joints that are not of the robot: {', '.join(rest)}",) if rest else ()
+        others = [name for name in names if name not in wanted]
+        notes = (f"joints that are not of the robot: {', '.join(others)}",) if others else ()
         return [list(names).index(name) for name in wanted], tuple(wanted), notes
     if count != len(wanted):
         listed = ", ".join(names or (file.names[index] for index in roles.joints["q"]))
