@@ -209,6 +209,8 @@ def test_states_by_joint_say_which_joint_is_left_out() -> None:
     ):
         with pytest.raises(InputError, match=message):
             job("{}", more=f"points: {{p: {{joints: {line}}}}}\n")
+    with pytest.raises(InputError, match="no value for turn, lift, roll"):  # some are pinned, not none
+        job("{}", more="points: {p: {joints: {}, xyz: [1, 2, 3]}}\n")
     with pytest.raises(InputError) as caught:
         job("{}", more="points: {p: {joints: [1, 2, x, 4]}, q: {joints: {turn: x, lift: 1 deg, roll: 3}}}\n")
     found = [(p.message.partition(",")[0], p.hint) for p in caught.value.problems]

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
-from tiers import few
 
 from trajcli.errors import InputError
 from trajcli.job.dump import dump_job
@@ -151,7 +150,7 @@ NOTED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("head", "points"), few(NOTED, 4))
+@pytest.mark.parametrize(("head", "points"), NOTED)
 def test_a_matrix_that_is_off_a_rotation_is_noted_wherever_its_pose_is_given(head: str, points: str) -> None:
     move = "moves: [{planner: quintic, to: p, duration: 9}]\n"
     plan = plan_job(job_with(points, head, move))

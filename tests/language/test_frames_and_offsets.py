@@ -161,6 +161,11 @@ def test_what_a_point_relative_to_joints_says_of_its_branch_holds_for_those_rela
         "  a: {from: j, configuration: {elbow: down}, joints: {wrist_3_joint: 20}, velocity: 3}\n"
         "  b: {from: a, offset: {xyz: [0, 0, 1]}}\n  c: {from: b, configuration: {wrist: flip}, joints: {elbow_joint: 10}}\n"
     )
+    pins_alone = read(
+        "  j: {joints: [0, -90, 90, 0, 90, 0]}\n  a: {from: j, joints: {wrist_3_joint: 20}}\n  b: {from: a}\n"
+    ).job.points["b"]
+    assert pins_alone.pinned is not None
+    assert pins_alone.pinned.by_index == pytest.approx({5: np.radians(20)})
     for each in (job, again(job)):
         points = each.job.points
         told = {
