@@ -106,7 +106,7 @@ WRONG_POSES = [
     ("x,y,z,qw,qx,qy", "1,2,3,1,0,0", "no column qz"),
     ("x,y", "1,2", "no column z"),
     ("x,y,z,z_mm", "1,2,3,3", "two columns for z: z and z_mm"),
-    ("x,y,z", "1,-2e12,3", "a value is larger than 1e+12 m"),
+    ("x,y,z", "1,-2e12,3", "a value is larger than 1e+12 rad or m"),
     ("x,y,z,qw,qx,qy,qz", "1,2,3,1.0002,0,0,0", "row 1: the quaternion has length 1.0002, not 1"),
     ("x,y,z,qw,qx,qy,qz", "1,2,3,0,0,0.9998,0", "row 1: the quaternion has length 0.9998, not 1"),
     *((f"x,y,z,{name}", "1,2,3,0", f"this file has '{name}'")

@@ -82,7 +82,9 @@ def test_a_turn_about_the_name_of_an_axis_and_its_vector_are_one() -> None:
         assert points["c"].direction == tuple(np.eye(3)[index])
 
 
-@pytest.mark.parametrize("vector", ["[0, 0, 0]", "[1e-200, 0, 0]", "[0, -1e-170, 1e-170]"])
+@pytest.mark.parametrize(
+    "vector", ["[0, 0, 0]", "[1e-200, 0, 0]", "[0, -1e-170, 1e-170]", "[3e-160, 4e-160, 0]"]
+)
 def test_axes_whose_length_vanishes_in_squares_are_refused_where_they_stand(vector: str) -> None:
     """Of a rail they were NaN in the base of the robot."""
     texts = [
@@ -91,7 +93,7 @@ def test_axes_whose_length_vanishes_in_squares_are_refused_where_they_stand(vect
         f"version: 1\nrobot: ur5e\nstart: {{joints: 0}}\npoints: {{p: {{direction: {vector}}}}}\n{MOVES}",
     ]
     for text in texts:
-        with pytest.raises(InputError, match="an axis of length 0 has no direction") as caught:
+        with pytest.raises(InputError, match=r"an axis of length .* has no direction") as caught:
             job_from_text(text)
         place = caught.value.problems[0].place
         assert place is not None

@@ -13,6 +13,7 @@ from trajcli.errors import InputError, PlanningError
 from trajcli.job.dump import dump_job
 from trajcli.job.inline import inline_target
 from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.kinematics.inverse.vendor_flags import kuka_flags
 from trajcli.language.targets import Target, ik_target
 from trajcli.units import Units
 
@@ -277,6 +278,7 @@ def test_bits_of_a_kuka_position(given: str, s: int, t: int | None) -> None:
     assert configuration is not None
     assert configuration.kuka is not None
     assert (configuration.kuka.s, configuration.kuka.t) == (s, t)
+    assert configuration.flags == kuka_flags(s, t)
     assert configuration.branch_names == {}
     named = read("  p: {xyz: [1, 2, 3], configuration: {wrist: flip}}\n").job.points["p"].configuration
     assert named is not None

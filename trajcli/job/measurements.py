@@ -11,15 +11,15 @@ import numpy as np
 from trajcli.columns import GROUPS, Column, group_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem, TrajcliError
-from trajcli.geometry.rotation import QUATERNION_DEFECT, matrix_from_quaternion
-from trajcli.job.files.recorded_values import joint_columns
+from trajcli.geometry.rotation import matrix_from_quaternion
+from trajcli.job.files.recorded_values import joint_columns, refuse_large, unit_quaternions
 from trajcli.job.messages import validated
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import read_document
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
 from trajcli.kinematics.inverse.target import IkTarget, partial_target
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import LARGEST_POSITION, Model, Number, ReadingContext, shown
+from trajcli.language.numbers import Model, Number, ReadingContext, shown
 from trajcli.language.per_joint import PerJoint
 from trajcli.language.targets import PoseFields, ik_target
 from trajcli.streams.table import Table, read_csv
@@ -217,6 +217,11 @@ def _from_table(table: Table, robot: Robot) -> Measurements:
     columns = {name: parse_column(name) for name in table.names}
     _refuse_unknown(table, columns, robot)
     joints = joint_columns(table, robot)
+    numbered = {robot.joint_names[c.joint or 0] for c in columns.values() if c.kind == "q"}
+    for name, column in columns.items():
+        if column.kind in {*_AXES} & {*robot.joint_names} - numbered:
+            text = f"{table.file}: {name} is a joint and a coordinate of the tool"
+            raise InputError(text, hint="call joints q1, q2, ...")
     axes = [_values(table, columns, name) for name in _AXES]
     turns = [_values(table, columns, name) for name in _QUATERNION]
     missing = [name for name, values in zip(_QUATERNION, turns, strict=True) if values is None]
@@ -228,10 +233,14 @@ def _from_table(table: Table, robot: Robot) -> Measurements:
         raise InputError(f"{table.file}: there are no columns of a measured pose", hint=hint)
     zero = np.zeros(len(joints))
     position = np.stack([zero if values is None else values for values in axes], axis=1)
-    if np.abs(position).max() > LARGEST_POSITION:
-        hint = "check its exponent and its unit"
-        raise InputError(f"{table.file}: a position is larger than {LARGEST_POSITION:g} m", hint=hint)
-    rotation = None if missing else _rotations(np.stack([v for v in turns if v is not None], axis=1), table)
+    refuse_large(position, table)
+    rotation = (
+        None
+        if missing
+        else matrix_from_quaternion(
+            unit_quaternions(np.stack([v for v in turns if v is not None], axis=1), table)
+        )
+    )
     x, y, z = measured
     target = partial_target(position, fixed=(x, y, z), rotation=rotation)
     deviations = _table_deviations(table, columns, any(measured), rotation is not None)
@@ -261,17 +270,6 @@ def _values(table: Table, columns: Mapping[str, Column], kind: str) -> Array | N
         hint = f"call it {kind}" + (f" (SI) or {kind}_{allowed}" if allowed else "")
         raise InputError(f"{table.file}: the column {names[0]} cannot be in {unit}", hint=hint)
     return np.asarray(table.column(names[0]) * columns[names[0]].factor)
-
-
-def _rotations(quaternions: Array, table: Table) -> Array:
-    length = np.linalg.norm(quaternions, axis=1)
-    wrong = np.flatnonzero(np.abs(length - 1.0) > QUATERNION_DEFECT)
-    if wrong.size:
-        row = int(wrong[0])
-        hint = f"the allowed difference is {QUATERNION_DEFECT:g}; the columns are qw, qx, qy, qz"
-        text = f"{table.file}, row {row + 1}: the quaternion has length {length[row]:.6g} instead of 1"
-        raise InputError(text, hint=hint)
-    return matrix_from_quaternion(quaternions)
 
 
 def _table_deviations(

@@ -91,11 +91,20 @@ def joint_columns(table: Table, robot: Robot) -> Array:
     positions = np.empty((len(table.columns), len(robot.joints)))
     for joint in range(len(robot.joints)):
         positions[:, joint] = _joint(table, robot, joint, present)
-    if max(positions.max(initial=0.0), -positions.min(initial=0.0)) > LARGEST_POSITION:
-        bound = f"{LARGEST_POSITION:g} rad or m"
-        raise InputError(f"{table.file}: a value is larger than {bound}", hint="check its exponent and unit")
+    refuse_large(positions, table)
     positions.flags.writeable = False  # who keeps it takes it without a copy
     return positions
+
+
+def refuse_large(values: Array, table: Table) -> None:
+    """Refuse angles or lengths that no robot has, rad or m.
+
+    Raises:
+        InputError: Names the file.
+    """
+    if max(values.max(initial=0.0), -values.min(initial=0.0)) > LARGEST_POSITION:
+        text = f"{table.file}: a value is larger than {LARGEST_POSITION:g} rad or m"
+        raise InputError(text, hint="check its exponent and unit")
 
 
 def _refuse_other_times(table: Table) -> None:
@@ -168,9 +177,7 @@ def read_poses(path: str, document: Document) -> RecordedPoses:
 def _positions(table: Table) -> Array:
     """Return the positions (m, 3), m."""
     positions = np.stack([_length(table, name) for name in _LENGTHS], axis=1)
-    if np.abs(positions).max() > LARGEST_POSITION:
-        bound = f"{LARGEST_POSITION:g} m"
-        raise InputError(f"{table.file}: a value is larger than {bound}", hint="check its exponent and unit")
+    refuse_large(positions, table)
     return positions
 
 
@@ -204,7 +211,15 @@ def _quaternions(table: Table) -> Array | None:
         lacking = ", ".join(name for name in _QUATERNION if name not in present)
         hint = "give qw, qx, qy and qz, or none of them: the orientation is then kept"
         raise InputError(f"{table.file}: no column {lacking}", hint=hint)
-    rows = np.stack([table.column(name) for name in _QUATERNION], axis=1)
+    return unit_quaternions(np.stack([table.column(name) for name in _QUATERNION], axis=1), table)
+
+
+def unit_quaternions(rows: Array, table: Table) -> Array:
+    """Return quaternions (N, 4), w first, of length 1.
+
+    Raises:
+        InputError: Names the first row whose length is another by more than rounding.
+    """
     sizes = np.linalg.norm(rows, axis=1)
     wrong = np.flatnonzero(np.abs(sizes - 1.0) > _UNIT)
     if wrong.size:
