@@ -187,6 +187,8 @@ def test_words_that_are_no_names_stay_as_they_are() -> None:
     for move in moves_of(text, points):
         assert (move.label, move.at[0].signal, move.to.euler.frame) == ("current", "current", "current")
     assert len({id(move) for move in moves_of(text, points)}) == 1
+    outside = "moves: [{planner: quintic, to: {xyz: [1, 2, 3], euler: {sequence: ZYZ, frame: current, angles: [1, 2, 3]}}}]\n"
+    assert len(moves_of(outside, points)) == 1
 
 
 def steps(*counts: str) -> int:
