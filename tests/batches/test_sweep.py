@@ -10,6 +10,7 @@ from collections.abc import Generator, Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,16 @@ import pytest
 import trajcli
 from trajcli.batches import sweep_table
 from trajcli.batches.processes import run_in_processes
-from trajcli.batches.sweep import PointLedger, Run, Sweep, SweepSetup, outcomes_of, parse_axis, sweep_of
+from trajcli.batches.sweep import (
+    PointLedger,
+    Run,
+    Sweep,
+    SweepSetup,
+    axis_of,
+    outcomes_of,
+    parse_axis,
+    sweep_of,
+)
 from trajcli.batches.sweep_table import SweepRow, SweepTable
 from trajcli.batches.task import JobOutcome, SweepPoint, Task, run_task
 from trajcli.errors import InputError, TrajcliError
@@ -385,6 +395,62 @@ def test_a_curve_shows_every_row(tmp_path: Path) -> None:
     assert b"a.b" in (tmp_path / "a.svg").read_bytes()
 
 
+def test_a_curve_goes_from_left_to_right_whatever_order_the_values_have() -> None:
+    order = (2, 0, 3, 1)
+    rows = [SweepRow((str(10 * k),), POINTS[k]) for k in order]
+    lines = drawn(SweepTable(("a.b",), tuple(rows)))
+    np.testing.assert_array_equal(lines["verified"][0], [[0, 10, 20, 30], [2, np.nan, 1, np.nan]])
+    np.testing.assert_array_equal(lines["bound"][0][1], [1.5, 0.25, np.nan, np.nan])
+    np.testing.assert_array_equal(lines["exceeded"][0], [[10], [0.5]])
+    np.testing.assert_array_equal(lines["missing"][0][0], [30])
+
+
+def test_drawn_points_are_planned_with_their_own_values(job: str) -> None:
+    sweep = swept(job, "moves.0.to.joints=45..90:1000", samples=7, seed=3)
+    table = table_of(sweep)
+    assert len(table.rows) == 7
+    assert sweep.rows != tuple(range(7))
+    for number, row in zip(sweep.rows, table.rows, strict=True):
+        angle = 45 + 45 * number / 999
+        assert float(row.values[0]) == pytest.approx(angle)
+        assert row.point.duration == pytest.approx(angle / 90 + 90 / 360, rel=1e-9)  # a trapezoid of the limits
+    outcomes = [outcome for _, outcome in outcomes_of(sweep, PointLedger(None), here)]
+    assert all(outcome.duration == outcome.point.duration for outcome in outcomes if outcome.point)
+
+
+def test_a_point_over_a_limit_says_which(job: str) -> None:
+    (row,) = table_of(swept(job, "limits.position=20,20")).rows[:1]
+    assert row.point.verdict == "exceeded"
+    assert row.point.reason is not None
+    assert "the position of j1 reaches 30 deg" in row.point.reason
+
+
+def test_cells_tell_zero_from_nothing_with_all_digits() -> None:
+    row = SweepRow(("1",), SweepPoint("verified", 0.0, None, 1 / 3))
+    assert SweepTable(("a",), (row,)).cells(row) == ["1", "verified", "0", "", repr(1 / 3)]
+    with pytest.raises(InputError, match="holds other things than numbers"):
+        SweepTable(("a",), (SweepRow(("true",), SweepPoint("verified", 1.0)),)).best("a")
+    assert sweep_table.form_of_table("A.CSV") == "csv"
+
+
+def test_a_map_has_its_values_at_its_axes_and_grey_where_nothing_moves() -> None:
+    values = [("10", "x"), ("10", "y"), ("9", "x")]
+    rows = [SweepRow(value, POINTS[k]) for value, k in zip(values, (0, 3, 1), strict=True)]
+    figure = sweep_table._figure(SweepTable(("a", "b"), tuple(rows)))
+    plane = figure.axes[0]
+    below, left = ([label.get_text() for label in axis.get_ticklabels()] for axis in (plane.xaxis, plane.yaxis))
+    assert (below, left) == (["9", "10"], ["x", "y"])
+    grey, durations = plane.images
+    assert (grey.origin, durations.origin) == ("lower", "lower")
+    shade = np.array(grey.get_array())
+    assert shade[1, 0].tolist() == [1, 1, 1]  # was not asked for
+    assert shade[1, 1] == pytest.approx(np.full(3, 0xDD / 255))
+    assert len([line for line in plane.lines if line.get_gid() == "exceeded"]) == 1  # there is no cross without a motion
+    many = SweepTable(("a",), tuple(SweepRow((f"n{k}",), POINTS[0]) for k in range(20)))
+    texts = [label.get_text() for label in sweep_table._figure(many).axes[0].xaxis.get_ticklabels()]
+    assert texts == [f"n{k}" for k in range(0, 20, 3)]
+
+
 def test_a_map_shows_every_row(tmp_path: Path) -> None:
     values = [("10", "2"), ("10", "1"), ("9", "2"), ("9", "1")]
     rows = [SweepRow(value, point) for value, point in zip(values, POINTS, strict=True)]
@@ -395,6 +461,23 @@ def test_a_map_shows_every_row(tmp_path: Path) -> None:
         SweepTable(("a", "b", "c"), ()).plot(tmp_path / "a.svg")
     with pytest.raises(InputError, match=r"not written as \.jpg"):
         TABLE.plot(tmp_path / "a.jpg")
+
+
+@pytest.mark.parametrize(
+    ("values", "texts"),
+    [
+        (np.linspace(0, 1, 3), ("0", "0.5", "1")),
+        (np.array([3, -1]), ("3", "-1")),
+        ([np.float64(0.1), np.int64(7), np.bool_(True)], ("0.1", "7", "true")),
+        (np.array([[0.5, 2.0], [1.0, 0.25]]), ("[0.5, 2]", "[1, 0.25]")),
+        (
+            [10**30, -(10**400), 1e15, 1e14, -0.0],
+            (str(10**30), str(-(10**400)), "1000000000000000.0", str(10**14), "0"),
+        ),
+    ],
+)
+def test_values_may_be_arrays_and_whole_numbers_of_any_size(values: Any, texts: tuple[str, ...]) -> None:
+    assert axis_of("a", values).values == texts
 
 
 def test_from_python(job: str) -> None:

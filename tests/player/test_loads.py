@@ -98,6 +98,20 @@ def test_a_load_is_there_while_it_is_carried(carry: tuple[Plan, dict[str, Any]])
     assert 4 / 3 * np.pi * load["radius"] ** 3 * 2700 == pytest.approx(5)
 
 
+def test_what_is_put_down_and_taken_up_again_is_there_twice() -> None:
+    again = (
+        "  - {detach: {}}\n  - {planner: trapezoid, to: {joints: [0]}}\n"
+        f"  - {{attach: {{mass: {CARRIED}, com: [20, 0, 0]}}}}\n"
+    )
+    moves = "  - {planner: trapezoid, to: {joints: [10]}}\n"
+    plan = plan_job(job_from_text(PENDULUM + again + moves + moves.replace("10", "20")))
+    spans = plan.trajectory.spans
+    loads = scene_of_plan(plan)["loads"]
+    intervals = [(load["start"], load["end"]) for load in loads]
+    assert intervals == [(spans[2].start, spans[2].end), (spans[6].start, spans[7].end)]
+    assert all((load["mass"], load["com"]) == (CARRIED, pytest.approx([0.02, 0, 0])) for load in loads)
+
+
 def test_the_tightest_limit_is_that_of_the_summary(carry: tuple[Plan, dict[str, Any]]) -> None:
     assert "effort of shoulder_lift_joint uses" in carry[1]["moves"][0]["detail"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,23 @@ def test_a_zone_is_a_ball_about_its_corner(cell: dict[str, Any]) -> None:
         assert programmed[[0, -1]] == pytest.approx(ends, abs=2e-6)
         assert np.linalg.norm(ends - corner, axis=1).max() <= radius * (1 + 1e-5)
         assert np.linalg.norm(ends - corner, axis=1).max() == pytest.approx(radius, rel=1e-4)
+
+
+def test_a_zone_says_what_it_uses_of_what_was_asked_and_when_its_corner_is_passed(
+    cell: dict[str, Any],
+) -> None:
+    plan = flown_cell()
+    flown = () if plan.flyby is None else plan.flyby.zones
+    for zone, own in zip(cell["zones"], flown, strict=True):
+        said = re.match(r"(\S+) mm of (\S+) mm \(position\)", zone["message"])
+        assert said is not None
+        used, asked = map(float, said.groups())
+        assert 1000 * zone["ball"][3] == pytest.approx(used, rel=1e-3)
+        assert (used, asked) == pytest.approx((1000 * own.used, 1000 * own.asked), rel=1e-3)
+        times = np.linspace(zone["start"], zone["end"], 2001)
+        tool = forward(plan.loaded.robot, plan.trajectory.curve.evaluate(times))[:, :3, 3]
+        nearest = times[np.linalg.norm(tool - zone["ball"][:3], axis=1).argmin()]
+        assert zone["time"] == pytest.approx(nearest, abs=0.2 * (zone["end"] - zone["start"]))
 
 
 def test_points_have_their_names(cell: dict[str, Any]) -> None:

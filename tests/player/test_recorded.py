@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from base64 import b64decode
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from trajcli.judge.file import CheckOptions
+from trajcli.errors import InputError
+from trajcli.findings import Finding
+from trajcli.judge.file import CheckedFile, CheckOptions
+from trajcli.judge.judgement import Judgement
 from trajcli.output.delivery.delivered import judged_file
 from trajcli.player.recorded import scene_of_file
+from trajcli.queries.arm import open_sheet
 from trajcli.streams.byte_source import ByteSource
+from trajcli.units import Units
 
 
 def scene(folder: Path, text: str, robot: str | None = None) -> dict[str, object]:
@@ -36,6 +43,95 @@ def test_moves_of_the_file(tmp_path: Path) -> None:
     assert [(move["start"], move["end"], move["index"]) for move in moves] == [(0, 2, "0"), (2, 3, "1")]
 
 
+def unpacked(columns: dict[str, Any]) -> np.ndarray:
+    low, high, width = np.array(columns["low"]), np.array(columns["high"]), columns["width"]
+    raw = np.frombuffer(b64decode(columns["values"]), np.uint8).reshape(len(low), -1, width).astype(float)
+    return low[:, None] + raw @ 256.0 ** np.arange(width) * (high - low)[:, None] / (256.0**width - 1)
+
+
+def test_columns_are_brought_to_si_and_to_the_order_of_the_joints(tmp_path: Path) -> None:
+    names = [f"q{k}" for k in (3, 10, 1, 2, 12, 11, 4, 5, 6, 7, 8, 9)]
+    cells = [name.removeprefix("q") for name in names]
+    head = ",".join(["t", *names]).replace("q10", "q10_deg").replace("q12", "q12_mm")
+    shown = scene(tmp_path, f"{head}\n0,{','.join(cells)}\n1,{','.join(12 * ['0'])}\n")
+    first = unpacked(shown["rows"]["quantities"]["q"])[:, 0]
+    expected = np.arange(1.0, 13)
+    expected[9], expected[11] = np.radians(10), 0.012
+    assert first == pytest.approx(expected, abs=1e-6)
+    plain = scene(tmp_path, "q2,t,q1\n5,0,7\n6,1,8\n")
+    assert unpacked(plain["rows"]["quantities"]["q"])[:, 0] == pytest.approx([7, 5])
+    mixed = scene(tmp_path, "t,q1_deg,q2_deg\n0,90,180\n1,0,0\n")
+    assert unpacked(mixed["rows"]["quantities"]["q"])[:, 0] == pytest.approx([pi / 2, pi])
+
+
+SLIDE = "convention: standard\njoints: [{a: 0.5, position: [-3, 3]}, {type: prismatic}]\n"
+
+
+def test_waypoints_stand_where_moves_meet_and_at_the_ends_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "arm.yaml").write_text(SLIDE)
+    arm = str(tmp_path / "arm.yaml")
+    rows = "\n5,0,0,4\n6,1,0.1,4\n7,2,0.2,8\n9,3,0.3,8\n"
+    shown = scene(tmp_path, f"t,q1,q2,move{rows}", arm)
+    assert [(each["time"], each["joints"]) for each in shown["waypoints"]] == [(5, [0, 0]), (7, [2, 0.2]), (9, [3, 0.3])]
+    assert [(move["start"], move["end"], move["label"], move["detail"]) for move in shown["moves"]] == [
+        (5, 7, "move 4", "2 s"),
+        (7, 9, "move 8", "2 s"),
+    ]
+    assert [(part["start"], part["end"]) for part in shown["limits"]] == [(5, 9)]
+    assert "4 rows · 4 s" in shown["subtitle"]
+    plain = scene(tmp_path, f"t,q1,q2,other{rows}", arm)
+    assert [each["time"] for each in plain["waypoints"]] == [5, 9]
+    assert not any("Drawn are" in note for note in plain["notes"])
+    rated = scene(tmp_path, "t,q1,q2,qd1,qd2\n0,0,0,1,0\n1,1,0,1,0\n", arm)
+    assert not any("no velocities" in note for note in rated["notes"])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,q1,q2\n0,0,0\n1,0,0\n1,0,0\n", "row 2 (from 0): the time 1 s follows 1 s"),
+        ("t,q1,q2\n0,0,0\n3,0,0\n2.5,0,0\n", "row 2 (from 0): the time 2.5 s follows 3 s"),
+        ("t,q1,q2_deg\n0,0,0\n", "the column 'q2_deg' of rows.csv is no length, and j2 is prismatic"),
+        ("t,q1_mm,q2\n0,0,0\n", "the column 'q1_mm' of rows.csv is no angle, and j1 is revolute"),
+        ("t,q1,q2,qd2_deg,qd1\n0,0,0,0,0\n", "the column 'qd2_deg' of rows.csv is no length"),
+        ("t,q1,q2\n0,0,1e30\n", "got 1e+30"),
+        ("t,q1\n0,0\n", "has the joint columns q1, expected q1 to q2 of arm, once each"),
+        ("q1,q2\n0,0\n", "has no column 't'"),
+    ],
+)
+def test_files_that_do_not_fit_the_arm_are_refused(
+    text: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text(SLIDE)
+    Path("rows.csv").write_text(text)
+    with pytest.raises(InputError) as refused:
+        scene_of_file("rows.csv", "arm.yaml")
+    assert message in str(refused.value)
+
+
+def test_what_a_judge_says_stands_at_its_time_or_at_the_start_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "arm.yaml").write_text(SLIDE)
+    robot = open_sheet(str(tmp_path / "arm.yaml")).robot
+    found = (
+        Finding("velocity", joint="j2", value=0.7, limit=0.5, time=7.0, message="too fast", hint="slower", move=3),
+        Finding("velocity", joint="j1", message="no number"),
+        Finding("time", message="no time"),
+        Finding("velocity", joint="j1", value=1.0, time=6.0, severity="warning"),
+    )
+    judgement = Judgement(found, "linear", 3, notes=("a note",))
+    checked = CheckedFile(judgement, robot, Units(), None, None, None)  # type: ignore[arg-type]
+    (tmp_path / "rows.csv").write_text("t,q1,q2\n5,0,0\n6,1,0\n8,0,0\n")
+    shown = scene_of_file(str(tmp_path / "rows.csv"), robot, checked)
+    assert (shown["verdict"]["state"], shown["verdict"]["text"]) == ("violated", "3 findings")
+    assert [(each["time"], each["joint"], each["order"], each["value"], each["label"]) for each in shown["findings"]] == [
+        (7.0, 1, 1, 0.7, "move 3:"), (5.0, 0, None, None, ""), (5.0, None, None, None, "")
+    ]
+    assert shown["opens_at"] == 7.0
+    assert "a note" in shown["notes"]
+    assert not any("not judged" in note for note in shown["notes"])
+
+
 def test_a_robot_brings_limits_and_the_path_of_its_tool(tmp_path: Path) -> None:
     shown = scene(tmp_path, "t,q1,q2\n0,0,0\n1,1.5707963267948966,0\n", "planar2r")
     assert shown["joints"][0]["units"][0] == "rad"
@@ -52,6 +148,12 @@ def test_velocities_give_the_speed_of_the_tool(tmp_path: Path) -> None:
     shown = scene(tmp_path, "t,q1,q2,qd1,qd2\n0,0,0,3,0\n1,1,0,0,5\n", "planar2r")
     assert shown["tool"]["speeds"]["high"] == pytest.approx([1.5])  # 0.5 m at 3 rad/s
     assert shown["tool"]["speeds"]["low"] == pytest.approx([1])  # 0.2 m at 5 rad/s
+
+
+def test_without_velocities_the_speed_is_that_between_rows_whatever_their_period(tmp_path: Path) -> None:
+    rows = "".join(f"{5 + k / 4},{k / 10},0\n" for k in range(9))
+    shown = scene(tmp_path, "t,q1,q2\n" + rows, "planar2r")
+    assert unpacked(shown["tool"]["speeds"])[0][4] == pytest.approx(0.5 * 0.4, rel=0.01)  # 0.5 m at 0.4 rad/s
 
 
 def test_rows_that_are_left_out_are_said(tmp_path: Path) -> None:

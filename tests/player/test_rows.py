@@ -12,6 +12,7 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.player.rows import (
     FRAMES,
     MOST_ROWS,
+    DrawnRows,
     frame_times,
     packed,
     rows_of_curve,
@@ -94,6 +95,37 @@ def test_a_long_file_keeps_its_extremes() -> None:
     assert kept.size < 700
     assert rows.values["q"].max() == 4
     assert (rows.times == times[kept]).all()
+
+
+def test_a_long_file_keeps_the_lowest_and_the_highest_of_every_column_of_every_quantity() -> None:
+    times = np.arange(20_001) / 2000
+    chance = np.random.default_rng(4)
+    values = {name: chance.uniform(-1, 1, (times.size, 2)) for name in ("q", "qd", "tau")}
+    for k, each in enumerate(values.values()):
+        each[3_001 + 11 * k, 0], each[5_003 + 13 * k, 1] = -3, 4
+        each[7_007 + 17 * k, 0], each[9_011 + 19 * k, 1] = 5, -6
+    rows, kept = rows_of_samples(times, values)
+    assert kept.size < 700
+    for name, each in values.items():
+        assert rows.values[name].min(axis=0).tolist() == each.min(axis=0).tolist()
+        assert rows.values[name].max(axis=0).tolist() == each.max(axis=0).tolist()
+
+
+def test_of_several_joints_each_shows_its_jumps_and_small_ones_of_any_order_are_seen() -> None:
+    """The acceleration of the second joint steps by a hundredth at 1 s, its jerk at 2 s; the first one rests."""
+    breaks, coefficients = np.array([0.0, 1.0, 2.0, 3.0]), np.zeros((4, 3, 2))
+    coefficients[3, :, 0] = 7.0
+    coefficients[:, :, 1] = np.array([[0, 0.5, 1, 0], [0, 0.505, 2, 1.5], [1e-3, 0.505, 3.01, 4.005]]).T
+    rows = rows_of_curve(PiecewisePolynomial(breaks, coefficients), [], [])
+    assert [(rows.times == time).sum() for time in (1.0, 2.0)] == [2, 2]
+    after = rows_of_curve(PiecewisePolynomial(breaks, coefficients), [], [7.0, -1.0])
+    assert (after.times[0], after.times[-1]) == (0.0, 3.0)
+
+
+def test_positions_and_efforts_are_packed_finer_than_rates() -> None:
+    values = {name: np.linspace(0, 1, 9)[:, None] for name in ("q", "qd", "tau")}
+    scene = DrawnRows(np.arange(9.0), values).packed()["quantities"]
+    assert {name: each["width"] for name, each in scene.items()} == {"q": 3, "qd": 2, "tau": 3}
 
 
 def test_a_short_file_keeps_every_row() -> None:

@@ -109,12 +109,13 @@ def _spread(text: str, first: str, last: str, count: str | None) -> Iterator[flo
 
 def number_text(value: float) -> str:
     """Return a number with the fewest digits that restore it."""
-    whole = value == int(value) and abs(value) < _WHOLE if np.isfinite(value) else False
-    return str(int(value)) if whole else repr(value)
+    return str(int(value)) if abs(value) < _WHOLE and value == int(value) else repr(value)
 
 
 def value_text(value: Any) -> str:  # noqa: ANN401
     """Return a value of the job as YAML on one line; a text without quotes where it needs none."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
     if isinstance(value, bool):
         return flow_text(value)
     if isinstance(value, int | float):

@@ -191,8 +191,10 @@ def _draw_curve(figure: Any, plane: Any, table: SweepTable) -> None:  # noqa: AN
     """Draw durations and their bounds; crosses are over a limit, ticks at the foot have no motion."""
     del figure
     x = _abscissas(plane.xaxis, tuple(row.values[0] for row in table.rows))
-    durations, bounds = (_numbers(table, name) for name in _NUMBERS)
-    verified = np.array([row.point.verdict == "verified" for row in table.rows])
+    order = np.argsort(x, kind="stable")
+    durations, bounds = (_numbers(table, name)[order] for name in _NUMBERS)
+    verified = np.array([table.rows[k].point.verdict == "verified" for k in order])
+    x = x[order]
     shown = np.where(verified, durations, np.nan)
     plane.plot(x, shown, color=COLOURS[0], marker="o", markersize=3, label="verified", gid="verified")
     if np.isfinite(bounds).any():

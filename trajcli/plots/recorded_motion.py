@@ -162,7 +162,7 @@ class DrawnTable:
 
     def _of(self, *kinds: str) -> Array:
         """Return columns that are not about joints, SI, shape (kinds, N)."""
-        index = {column.kind: k for k, column in enumerate(self.columns) if column.joint is None}
+        index = {column.kind: k for k, column in enumerate(self.columns)}
         rows = [self.table.columns[:, index[kind]] * self.columns[index[kind]].factor for kind in kinds]
         return np.array(rows)
 
