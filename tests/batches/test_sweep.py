@@ -413,7 +413,9 @@ def test_drawn_points_are_planned_with_their_own_values(job: str) -> None:
     for number, row in zip(sweep.rows, table.rows, strict=True):
         angle = 45 + 45 * number / 999
         assert float(row.values[0]) == pytest.approx(angle)
-        assert row.point.duration == pytest.approx(angle / 90 + 90 / 360, rel=1e-9)  # a trapezoid of the limits
+        assert row.point.duration == pytest.approx(
+            angle / 90 + 90 / 360, rel=1e-9
+        )  # a trapezoid of the limits
     outcomes = [outcome for _, outcome in outcomes_of(sweep, PointLedger(None), here)]
     assert all(outcome.duration == outcome.point.duration for outcome in outcomes if outcome.point)
 
@@ -438,14 +440,18 @@ def test_a_map_has_its_values_at_its_axes_and_grey_where_nothing_moves() -> None
     rows = [SweepRow(value, POINTS[k]) for value, k in zip(values, (0, 3, 1), strict=True)]
     figure = sweep_table._figure(SweepTable(("a", "b"), tuple(rows)))
     plane = figure.axes[0]
-    below, left = ([label.get_text() for label in axis.get_ticklabels()] for axis in (plane.xaxis, plane.yaxis))
+    below, left = (
+        [label.get_text() for label in axis.get_ticklabels()] for axis in (plane.xaxis, plane.yaxis)
+    )
     assert (below, left) == (["9", "10"], ["x", "y"])
     grey, durations = plane.images
     assert (grey.origin, durations.origin) == ("lower", "lower")
     shade = np.array(grey.get_array())
     assert shade[1, 0].tolist() == [1, 1, 1]  # was not asked for
     assert shade[1, 1] == pytest.approx(np.full(3, 0xDD / 255))
-    assert len([line for line in plane.lines if line.get_gid() == "exceeded"]) == 1  # there is no cross without a motion
+    assert (
+        len([line for line in plane.lines if line.get_gid() == "exceeded"]) == 1
+    )  # there is no cross without a motion
     many = SweepTable(("a",), tuple(SweepRow((f"n{k}",), POINTS[0]) for k in range(20)))
     texts = [label.get_text() for label in sweep_table._figure(many).axes[0].xaxis.get_ticklabels()]
     assert texts == [f"n{k}" for k in range(0, 20, 3)]

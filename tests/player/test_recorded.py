@@ -72,7 +72,11 @@ def test_waypoints_stand_where_moves_meet_and_at_the_ends_of_the_file(tmp_path: 
     arm = str(tmp_path / "arm.yaml")
     rows = "\n5,0,0,4\n6,1,0.1,4\n7,2,0.2,8\n9,3,0.3,8\n"
     shown = scene(tmp_path, f"t,q1,q2,move{rows}", arm)
-    assert [(each["time"], each["joints"]) for each in shown["waypoints"]] == [(5, [0, 0]), (7, [2, 0.2]), (9, [3, 0.3])]
+    assert [(each["time"], each["joints"]) for each in shown["waypoints"]] == [
+        (5, [0, 0]),
+        (7, [2, 0.2]),
+        (9, [3, 0.3]),
+    ]
     assert [(move["start"], move["end"], move["label"], move["detail"]) for move in shown["moves"]] == [
         (5, 7, "move 4", "2 s"),
         (7, 9, "move 8", "2 s"),
@@ -114,7 +118,9 @@ def test_what_a_judge_says_stands_at_its_time_or_at_the_start_of_the_file(tmp_pa
     (tmp_path / "arm.yaml").write_text(SLIDE)
     robot = open_sheet(str(tmp_path / "arm.yaml")).robot
     found = (
-        Finding("velocity", joint="j2", value=0.7, limit=0.5, time=7.0, message="too fast", hint="slower", move=3),
+        Finding(
+            "velocity", joint="j2", value=0.7, limit=0.5, time=7.0, message="too fast", hint="slower", move=3
+        ),
         Finding("velocity", joint="j1", message="no number"),
         Finding("time", message="no time"),
         Finding("velocity", joint="j1", value=1.0, time=6.0, severity="warning"),
@@ -124,9 +130,10 @@ def test_what_a_judge_says_stands_at_its_time_or_at_the_start_of_the_file(tmp_pa
     (tmp_path / "rows.csv").write_text("t,q1,q2\n5,0,0\n6,1,0\n8,0,0\n")
     shown = scene_of_file(str(tmp_path / "rows.csv"), robot, checked)
     assert (shown["verdict"]["state"], shown["verdict"]["text"]) == ("violated", "3 findings")
-    assert [(each["time"], each["joint"], each["order"], each["value"], each["label"]) for each in shown["findings"]] == [
-        (7.0, 1, 1, 0.7, "move 3:"), (5.0, 0, None, None, ""), (5.0, None, None, None, "")
-    ]
+    assert [
+        (each["time"], each["joint"], each["order"], each["value"], each["label"])
+        for each in shown["findings"]
+    ] == [(7.0, 1, 1, 0.7, "move 3:"), (5.0, 0, None, None, ""), (5.0, None, None, None, "")]
     assert shown["opens_at"] == 7.0
     assert "a note" in shown["notes"]
     assert not any("not judged" in note for note in shown["notes"])

@@ -211,11 +211,21 @@ def test_plots_are_numbered_by_the_kinds_of_limits() -> None:
 def test_angles_in_any_unit_go_with_each_other_and_with_what_is_open_but_not_with_lengths() -> None:
     def of(*units: str) -> dict[str, Any]:
         joints = [{"units": [unit]} for unit in units]
-        return {"title": "/".join(units), "joints": joints, "notes": [], "findings": [], "causes": [], "moves": []}
+        return {
+            "title": "/".join(units),
+            "joints": joints,
+            "notes": [],
+            "findings": [],
+            "causes": [],
+            "moves": [],
+        }
 
     for second in (("rad", "mm"), ("deg", "m"), ("rad or m", "rad or m")):
         assert scene_of_two(of("deg", "mm"), of(*second))["other"]["title"] == "/".join(second)
-    for second, message in ((("mm", "mm"), "joint 1 is an angle in deg/mm and a length in mm/mm"), (("deg",), "have not as many joints")):
+    for second, message in (
+        (("mm", "mm"), "joint 1 is an angle in deg/mm and a length in mm/mm"),
+        (("deg",), "have not as many joints"),
+    ):
         with pytest.raises(InputError, match=message):
             scene_of_two(of("deg", "mm"), of(*second))
 

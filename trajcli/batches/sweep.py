@@ -189,8 +189,8 @@ def _bound_of_move(move: PlannedMove) -> float | None:
     if not move.planned.curve.coefficients[:-1].any():
         return move.duration
     certificate = move.planned.certificate
-    known = [reference_of(move).duration, None if certificate is None else certificate.lower]
-    return max((bound for bound in known if bound is not None), default=None)
+    lower = [reference_of(move).duration, None if certificate is None else certificate.lower]
+    return max((bound for bound in lower if bound is not None), default=None)
 
 
 @frozen
@@ -290,15 +290,15 @@ def _check_paths(document: Document, axes: Sequence[Axis]) -> None:
 
 def _check_name(document: Document, axis: Axis) -> None:
     """Refuse an axis that would add a point, frame, tool or sequence, which nothing in the job names."""
-    section, *rest = axis.setting(0).path
-    if section not in _NAMED or not rest or document.node((section, rest[0])) is not None:
+    section, *keys = axis.setting(0).path
+    if section not in _NAMED or not keys or document.node((section, keys[0])) is not None:
         return
     from trajcli.suggest import did_you_mean, valid_names
 
     node = document.node((section,))
-    known = list(node.value) if node is not None and isinstance(node.value, dict) else []
-    hint = did_you_mean(str(rest[0]), known) or valid_names(known, str(section))
-    raise InputError(f"--vary {axis.path}: the job has no {section}.{rest[0]}", hint=hint or None)
+    names = list(node.value) if node is not None and isinstance(node.value, dict) else []
+    hint = did_you_mean(str(keys[0]), names) or valid_names(names, str(section))
+    raise InputError(f"--vary {axis.path}: the job has no {section}.{keys[0]}", hint=hint or None)
 
 
 def _refusal(document: Document, settings: tuple[Setting, ...]) -> InputError | None:
@@ -324,7 +324,7 @@ class PointLedger:
         self._path = None if table is None else Path(table).with_name(f".{Path(table).name}.sweep.jsonl")
         if self._path is not None:
             make_folder(self._path.parent)
-        self.known = dict[str, SweepPoint]() if force or self._path is None else _points(self._path)
+        self.points = dict[str, SweepPoint]() if force or self._path is None else _points(self._path)
 
     @property
     def kept(self) -> bool:
@@ -333,7 +333,7 @@ class PointLedger:
 
     def add(self, inputs: str, point: SweepPoint) -> None:
         """Take what came of a point; where it cannot be written, it is planned again next time."""
-        self.known[inputs] = point
+        self.points[inputs] = point
         if self._path is not None:
             with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
                 file.write(_line(inputs, point))
@@ -341,7 +341,7 @@ class PointLedger:
     def close(self, inputs: Sequence[str | None]) -> None:
         """Keep the points of this sweep only, each once."""
         if self._path is not None:
-            lines = [_line(each, self.known[each]) for each in inputs if each in self.known]
+            lines = [_line(each, self.points[each]) for each in inputs if each in self.points]
             with suppress(TrajcliError), whole_file(self._path) as out:
                 out.write("".join(lines).encode())
 
@@ -352,14 +352,14 @@ def _line(inputs: str, point: SweepPoint) -> str:
 
 def _points(path: Path) -> dict[str, SweepPoint]:
     """Return the points of a ledger; what is half written is none."""
-    known = dict[str, SweepPoint]()
+    points = dict[str, SweepPoint]()
     with suppress(OSError, UnicodeDecodeError):
         for line in path.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError, TypeError, KeyError):
                 value = json.loads(line)
                 inputs = str(value.pop("inputs"))
-                known[inputs] = SweepPoint(**value)
-    return known
+                points[inputs] = SweepPoint(**value)
+    return points
 
 
 def outcomes_of(sweep: Sweep, ledger: PointLedger, run: Run) -> Generator[tuple[int, JobOutcome], None, None]:
@@ -370,10 +370,10 @@ def outcomes_of(sweep: Sweep, ledger: PointLedger, run: Run) -> Generator[tuple[
         ledger: What is known of them, and takes what comes.
         run: Plans points, by processes of this machine or by a cluster.
     """
-    known = [sweep.inputs(number) if ledger.kept else None for number in sweep.rows]
+    hashes = [sweep.inputs(number) if ledger.kept else None for number in sweep.rows]
     tasks = list[Task]()
-    for row, (number, inputs) in enumerate(zip(sweep.rows, known, strict=True)):
-        point = ledger.known.get(inputs or "")
+    for row, (number, inputs) in enumerate(zip(sweep.rows, hashes, strict=True)):
+        point = ledger.points.get(inputs or "")
         job = BatchJob(sweep.file, str(row))
         if point is not None:
             yield row, JobOutcome(job, "unchanged", duration=point.duration, point=point)
@@ -382,9 +382,9 @@ def outcomes_of(sweep: Sweep, ledger: PointLedger, run: Run) -> Generator[tuple[
     with closing(run(tasks, SweepSetup(sweep.content))) as done:
         for outcome in done:
             row = int(outcome.job.output)
-            inputs = known[row]
+            inputs = hashes[row]
             # where a file has changed meanwhile, nobody knows of which content the point was made
             if outcome.point is not None and inputs is not None and inputs == sweep.inputs(sweep.rows[row]):
                 ledger.add(inputs, outcome.point)
             yield row, outcome
-    ledger.close(known)
+    ledger.close(hashes)

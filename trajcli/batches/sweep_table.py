@@ -29,7 +29,7 @@ RESULTS = ("verdict", "duration", "tightest", "bound")
 _NUMBERS = ("duration", "bound")
 _WIDTH, _HEIGHT = 7.0, 4.6  # of a picture, inches
 _TICKS, _LABEL, _SIZE = 9, 1.1, 9.0  # most labels of an axis, inches each may take, size of texts in points
-_NOWHERE = "#DDDDDD"
+_GREY = [0xDD / 255] * 3
 
 
 @frozen
@@ -63,8 +63,7 @@ class SweepTable:
     rows: tuple[SweepRow, ...]
 
     def __repr__(self) -> str:
-        verified = sum(row.point.verdict == "verified" for row in self.rows)
-        return f"SweepTable({', '.join(self.paths)}: {len(self.rows)} rows, {verified} verified)"
+        return f"SweepTable({', '.join(self.paths)}: {_title(self)})"
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -152,9 +151,9 @@ def check_column(paths: Sequence[str], column: str) -> str:
     Raises:
         InputError: When there is none of that name, or it never holds numbers.
     """
-    known, name = (*paths, *_NUMBERS), column.removeprefix("-")
-    if name not in known:
-        hint = did_you_mean(name, known) or valid_names(known)
+    columns, name = (*paths, *_NUMBERS), column.removeprefix("-")
+    if name not in columns:
+        hint = did_you_mean(name, columns) or valid_names(columns)
         raise InputError(f"--best {column}: there is no column of numbers '{name}'", hint=hint)
     return name
 
@@ -191,10 +190,10 @@ def _draw_curve(figure: Any, plane: Any, table: SweepTable) -> None:  # noqa: AN
     """Draw durations and their bounds; crosses are over a limit, ticks at the foot have no motion."""
     del figure
     x = _abscissas(plane.xaxis, tuple(row.values[0] for row in table.rows))
-    order = np.argsort(x, kind="stable")
-    durations, bounds = (_numbers(table, name)[order] for name in _NUMBERS)
-    verified = np.array([table.rows[k].point.verdict == "verified" for k in order])
-    x = x[order]
+    table = SweepTable(table.paths, tuple(table.rows[k] for k in x.argsort(kind="stable")))
+    x.sort()
+    durations, bounds = (_numbers(table, name) for name in _NUMBERS)
+    verified = np.array([row.point.verdict == "verified" for row in table.rows])
     shown = np.where(verified, durations, np.nan)
     plane.plot(x, shown, color=COLOURS[0], marker="o", markersize=3, label="verified", gid="verified")
     if np.isfinite(bounds).any():
@@ -225,7 +224,7 @@ def _draw_map(figure: Any, plane: Any, table: SweepTable) -> None:  # noqa: ANN4
     _label_ticks(plane.xaxis, across)
     _label_ticks(plane.yaxis, up)
     plane.set_ylabel(shortened(table.paths[1], _SIZE, _HEIGHT - 1), fontsize=_SIZE)
-    grey = np.where(asked[..., None] > 0, _rgb(_NOWHERE), 1.0)
+    grey = np.where(asked[..., None] > 0, _GREY, 1.0)
     plane.imshow(grey, origin="lower", aspect="auto", interpolation="nearest")
     if np.isfinite(colours).any():
         shown = plane.imshow(
@@ -244,10 +243,6 @@ def _in_order(values: Iterable[str]) -> tuple[str, ...]:
     with suppress(ValueError):
         return tuple(sorted(once, key=float))
     return once
-
-
-def _rgb(colour: str) -> Array:
-    return np.array([int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)])
 
 
 def _numbers(table: SweepTable, name: str) -> Array:

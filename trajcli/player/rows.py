@@ -30,7 +30,7 @@ class DrawnRows:
 
     Attributes:
         times: Shape (N,), s, never decreasing.
-        values: By "q", "qd", "qdd", "qddd", "tau" (those that are known), each of shape (N, n), SI.
+        values: By "q", "qd", "qdd", "qddd", "tau", as far as known, (N, n), SI.
     """
 
     times: Array
@@ -59,7 +59,7 @@ def rows_of_curve(curve: PiecewisePolynomial, borders: Sequence[float], extra: S
     """
     frames = frame_times(curve.start, curve.end)
     jumps = _visible_jumps(
-        curve, np.array(borders), most=int(_jumps_a_frame(curve.dimension) * frames.size) + len(borders)
+        curve, np.array(borders), upper=int(_jumps_a_frame(curve.dimension) * frames.size) + len(borders)
     )
     single = np.append(frames, np.clip(extra, curve.start, curve.end))
     single = distinct(single[~_among(single, jumps)])
@@ -74,11 +74,11 @@ def rows_of_curve(curve: PiecewisePolynomial, borders: Sequence[float], extra: S
 
 def _jumps_a_frame(joints: int) -> float:
     bytes_of_row = 16 + sum(_BYTES.get(name, 2) for name in ORDERS) * joints  # 16: time, tool, its speed
-    least, most = _JUMPS
-    return min(max(0.5 * (_BYTES_A_FRAME / bytes_of_row - 1), least), most)
+    least, upper = _JUMPS
+    return min(max(0.5 * (_BYTES_A_FRAME / bytes_of_row - 1), least), upper)
 
 
-def _visible_jumps(curve: PiecewisePolynomial, borders: Array, most: int) -> Array:
+def _visible_jumps(curve: PiecewisePolynomial, borders: Array, upper: int) -> Array:
     """Return the inner breaks where a derivative jumps visibly, and those of `borders`; shape (k,), s."""
     inner = curve.breaks[1:-1]
     size = np.zeros(inner.size)
@@ -88,7 +88,7 @@ def _visible_jumps(curve: PiecewisePolynomial, borders: Array, most: int) -> Arr
         jump = np.abs(begins[1:] - ends[:-1]) / np.where(largest > 0, largest, 1.0)
         size = np.maximum(size, jump.max(axis=1))
     size[_among(inner, np.sort(borders))] = np.inf
-    largest_first = np.argsort(-size, kind="stable")[:most]
+    largest_first = np.argsort(-size, kind="stable")[:upper]
     return np.sort(inner[largest_first[size[largest_first] > _SEEN]])
 
 

@@ -81,11 +81,11 @@ def units_of_files(columns: Iterable[tuple[str, Column]]) -> DisplayUnits:
         if column.joint is None:
             continue
         count = max(count, column.joint + 1)
-        known = units.get(column.joint)
+        before = units.get(column.joint)
         if column.unit is None:
             continue
-        if known is not None and known[1] != column.unit:
-            message = f"joint {column.joint + 1} is in {known[1]} in {known[0]}, in {column.unit} in {file}"
+        if before is not None and before[1] != column.unit:
+            message = f"joint {column.joint + 1} is in {before[1]} in {before[0]}, in {column.unit} in {file}"
             raise InputError(message, hint="plot the files on their own")
         units[column.joint] = (file, column.unit)
     every = {column.unit for _, column in listed}

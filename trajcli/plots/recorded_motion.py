@@ -174,9 +174,9 @@ class DrawnTable:
         found = []
         for kind in kinds:
             columns = [self.joint(kind, joint) for joint in range(count)]
-            known = [values for values in columns if values is not None]
-            if len(known) < count:
+            present = [values for values in columns if values is not None]
+            if len(present) < count:
                 return None
             scales = [self.display.joint_factor(joint) for joint in range(count)]
-            found.append(np.stack(known, axis=1) * scales)
+            found.append(np.stack(present, axis=1) * scales)
         return tuple(found)
