@@ -17,6 +17,7 @@ from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.findings import Finding
 from trajcli.job.read import job_from_text
+from trajcli.kinematics.robot import ToolLimits
 from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.flying_by import flown_parts as looked_for
 from trajcli.planners.flying_by import motion_search
@@ -31,7 +32,7 @@ from trajcli.planners.flying_by.flown_parts import (
     zone_motion,
 )
 from trajcli.planners.flying_by.flown_parts import _law_between as law_between
-from trajcli.planners.flying_by.motion_search import POWERS, with_shares
+from trajcli.planners.flying_by.motion_search import POWERS, duration_of, with_shares
 from trajcli.planners.flying_by.row import row_of
 from trajcli.planners.flying_by.search import FoundStates, begin_search
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
@@ -390,6 +391,30 @@ def test_what_joints_do_not_use_in_a_zone_is_lowered_at_once():
         motion = FlownPart(PiecewisePolynomial(np.array([0.0, 1.0]), times * line))
         uses = looked_for.joint_uses(motion.curve, limits)
         assert uses == pytest.approx(np.array([[share, share / 2], [0, 0], [0, 0]]))
+
+
+def test_a_second_search_lowers_paces_where_that_looks_faster():
+    """Of the acceleration of the tool in a zone: it ends where one does that knows nothing of the first."""
+    free, _ = chain_with("joints")
+    corner = free.corners[0]
+    limits = replace(corner.robot.limits, tcp=ToolLimits(acceleration=1.5))
+    chain = replace(free, corners=(replace(corner, robot=replace(corner.robot, limits=limits)),))
+    search = motion_search.MotionSearch(CourseLaws())
+    by_order = duration_of(search.fastest(chain))
+    alone = motion_search.MotionSearch(CourseLaws(), by_order=False)
+    by_pace = duration_of(alone.fastest(chain))
+    assert by_order < by_pace * 0.99
+    assert search.by_pace(chain, anyway=False) is None
+    others = [search.by_pace(chain, anyway=True)]
+    search._expected = by_pace * 1.01
+    for other in (*others, search.by_pace(chain, anyway=False)):
+        assert other is not None
+        assert duration_of(other.fastest(chain)) == pytest.approx(by_pace, rel=1e-3)
+        assert not other.lowered
+        assert other.model == pytest.approx(alone.model, rel=1e-3)
+    unlimited = motion_search.MotionSearch(CourseLaws())
+    unlimited.fastest(free)
+    assert unlimited.by_pace(free, anyway=True) is None
 
 
 @pytest.mark.parametrize(

@@ -231,9 +231,8 @@ class _Expansion:
                 hint = did_you_mean(node.value, counts) or valid_names(counts, "names that are many")
                 if needed := " and ".join(self._names.needs(node.value)):
                     hint = f"it is one for each of {needed}: repeat {needed}"
-                raise self._names.refused(
-                    f"'{node.value}' is not many itself", path, hint or "no point of the job is a grid or a list"
-                )
+                message = f"'{node.value}' is not many itself"
+                raise self._names.refused(message, path, hint or "no point of the job is a grid or a list")
         names = tuple(str(node.value) for node in listed)
         if not names or len(set(names)) < len(names):
             raise self._names.refused("expected different names", path)

@@ -80,7 +80,7 @@ class MotionSearch:
         lowered: Whether a derivative of the joints was lowered in a zone for a limit of the tool.
     """
 
-    def __init__(self, laws: CourseLaws, *, by_order: bool) -> None:
+    def __init__(self, laws: CourseLaws, *, by_order: bool = True) -> None:
         """Begin.
 
         Args:
@@ -92,7 +92,7 @@ class MotionSearch:
         self.chain: FlyByChain
         self.model = math.inf
         self._paces: dict[int, float] = {}
-        self._lowering = 0.0
+        self._lowering, self._expected = 0.0, math.inf  # s, the latter without laws
         self._near: Array | None = None
         self._zones: dict[tuple[object, ...], tuple[list[Finding], Array]] = {}
         self._laws, self._stopping = laws, StoppingLaws(laws)
@@ -105,12 +105,10 @@ class MotionSearch:
         Raises:
             PlanningError: When none is found.
         """
-        self.chain = chain
-        eased = np.array([1.0 if course.uniform else _EASED for course in chain.courses])
+        self.chain, eased = chain, self._eased(chain)
         best: list[FlownPart] | None = None
         for _ in range(_MOST):
-            paces = np.array([self._pace(k) for k in range(len(chain.courses))])
-            found, row = self._searched(paces, eased)
+            found, row = self._searched(eased)
             if not math.isfinite(found.duration):
                 if best is None and self._stopping.slow_all(self.chain):
                     continue
@@ -134,6 +132,28 @@ class MotionSearch:
         self.chain = self._motion.chain  # a later search may have lowered zones more
         self.model = min(self.model, duration_of(best) - self._motion.lowering)
         return best
+
+    @staticmethod
+    def _eased(chain: FlyByChain) -> Array:
+        return np.array([1.0 if course.uniform else _EASED for course in chain.courses])
+
+    def by_pace(self, chain: FlyByChain, *, anyway: bool) -> MotionSearch | None:
+        """Return a search in which limits of the tool lower the pace of zones, if that looks faster.
+
+        Args:
+            chain: That was searched, its zones not lowered.
+            anyway: Whether it need not look faster.
+        """
+        if not self.lowered:
+            return None
+        other = MotionSearch(self._laws, by_order=False)
+        other.chain, other._near, other._zones = chain, self._near, self._zones
+        try:
+            other._searched(self._eased(chain), roughly=True)
+        except PlanningError:
+            return None
+        other._paces, other._lowering = self._paces, 0.0
+        return other if anyway or other._expected < self._expected else None
 
     def _flown(self, row: ChainRow, found: FoundStates) -> tuple[FoundStates, list[FlownPart]]:
         """Return the parts of a motion, and its states: those at borders near which laws fail are calmed."""
@@ -230,11 +250,12 @@ class MotionSearch:
                 self._paces[id(course)] *= factor
         return float(np.abs(changes - 1).max())
 
-    def _searched(self, paces: Array, eased: Array) -> tuple[FoundStates, ChainRow]:
+    def _searched(self, eased: Array, *, roughly: bool = False) -> tuple[FoundStates, ChainRow]:
         """Return the states found, and their row, once zones are as slow as limits ask for."""
         before = math.inf
+        paces = [self._pace(k) for k in range(len(self.chain.courses))]
         for turn in range(_LOWERINGS):
-            row = row_of(self.chain, paces.tolist(), eased.tolist(), self._stopping.states(self.chain))
+            row = row_of(self.chain, paces, eased.tolist(), self._stopping.states(self.chain))
             for found in _found(row, self.chain.ends, self._near, twice=self.exact):
                 if not math.isfinite(found.duration):
                     return found, row
@@ -244,6 +265,10 @@ class MotionSearch:
                 self._near, before = found.states, found.duration
                 if turn + 1 < _LOWERINGS and self._lowered(found.states):
                     break
+                if math.isinf(self._expected):
+                    self._expected = found.duration
+                if roughly:
+                    return found, row
             else:
                 break
         return found, row

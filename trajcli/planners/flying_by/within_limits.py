@@ -1,8 +1,8 @@
 """Chains that are as fast as is found, and keep all limits.
 
 Where a part of the motion is over a limit, its pace alone is lowered until it is not. Where the tool is over
-a limit in a zone, that derivative of the joints alone is lowered, or the pace, whichever is faster. Where it
-leaves its zone, smaller borders are tried, then a slower pace.
+a limit in a zone, that derivative of the joints alone is lowered, or the pace, whichever looks faster. Where
+it leaves its zone, smaller borders are tried, then a slower pace.
 
 Lines in joint space that go on in the same direction under the same limits are one.
 """
@@ -270,16 +270,15 @@ def _within_limits(
     courses: Sequence[Course], zones: Sequence[ZoneAround], ends: tuple[Array, Array]
 ) -> tuple[FlyByChain, list[FlownPart], float]:
     """Return the fastest chain found whose parts keep limits and zones, its parts, and its `model`."""
-    found, errors = [], []
-    laws = CourseLaws()
-    for by_order in (True, False):
-        search = MotionSearch(laws, by_order=by_order)
+    search: MotionSearch | None = MotionSearch(CourseLaws())
+    found, errors = [], list[PlanningError]()
+    while search is not None:
         try:
             found.append((*_kept(courses, zones, ends, search), search.model))
         except PlanningError as error:
             errors.append(error)
-        if not search.lowered:
-            break
+        whole = chain_of(courses, zones, ends, [1.0] * len(zones))
+        search = search.by_pace(straightened(whole).joined, anyway=not found)
     if not found:
         raise errors[0]
     return min(found, key=lambda each: duration_of(each[1]))
