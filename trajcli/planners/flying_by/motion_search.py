@@ -144,8 +144,6 @@ class MotionSearch:
             chain: That was searched, its zones not lowered.
             anyway: Whether it need not look faster.
         """
-        if not self.lowered:
-            return None
         other = MotionSearch(self._laws, by_order=False)
         other.chain, other._near, other._zones = chain, self._near, self._zones
         try:

@@ -277,6 +277,8 @@ def _within_limits(
             found.append((*_kept(courses, zones, ends, search), search.model))
         except PlanningError as error:
             errors.append(error)
+        if not search.lowered:
+            break
         whole = chain_of(courses, zones, ends, [1.0] * len(zones))
         search = search.by_pace(straightened(whole).joined, anyway=not found)
     if not found:
