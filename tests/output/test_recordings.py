@@ -1,0 +1,99 @@
+"""What a log holds beside its rows: times in whole nanoseconds, the path of the tool, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from trajcli.errors import InputError
+from trajcli.job.read import job_from_text
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import Joint, Robot, unlimited
+from trajcli.output.recording import LogOptions, check_log_options, recording_of
+from trajcli.planning.plan import Plan, plan_job
+
+HEAD = {"version": 1, "robot": "ur5e", "start": {"joints": [0, -1.5, 1.5, 0, 0.1, 0.2]}}
+THERE = {"planner": "quintic", "to": {"joints": [0.3, -1.2, 1.4, 0.1, 0.2, 0.4]}}
+BARE = Robot("bare", (Joint("a"),), unlimited(1), None, np.eye(4), np.eye(4))
+
+
+@cache
+def _planned(text: str) -> Plan:
+    return plan_job(job_from_text(text))
+
+
+def planned(duration: float, start: float = 0.0, *more: dict[str, Any]) -> Plan:
+    moves = [{**THERE, "duration": duration}, *more]
+    return _planned(json.dumps({**HEAD, "moves": moves, "output": {"start_time": start}}))
+
+
+@pytest.mark.parametrize(
+    ("epoch", "start", "origin"),
+    [
+        (None, 0.25, 250_000_000),
+        ("1700000000.123456789", 0.0, 1_700_000_000_123_456_789),  # more digits than a float has
+        ("5", -4.9999999996, 0),
+        ("5", 2.0000000006, 7_000_000_001),
+        ("0", 0.0, 0),
+    ],
+)
+def test_times_are_whole_nanoseconds_behind_the_epoch(epoch: str | None, start: float, origin: int) -> None:
+    made = recording_of(planned(1.2345678916, start), LogOptions(epoch=epoch, compression="lz4"))
+    assert (made.origin, made.duration, made.compression) == (origin, 1_234_567_892, "lz4")
+    assert made.origin - made.epoch == round(start * 1e9)
+    assert made.metadata["epoch"] == str(made.epoch)
+
+
+def test_signals_are_set_at_the_nearest_nanosecond() -> None:
+    set_at = {"at": {"signal": "s", "value": 3, "before": 0.5}}
+    plan = planned(1.2345678916, 0.0, {"signal": "s", "value": 2}, {**THERE, "duration": 2, **set_at})
+    found = recording_of(plan, LogOptions()).signals
+    assert found == {"s": ((1_234_567_892, 2.0), (2_734_567_892, 3.0))}
+
+
+@pytest.mark.parametrize(("duration", "count"), [(1.0, 62), (0.99, 61), (30.0, 1000), (0.001, 2)])
+def test_the_path_is_shown_sixty_times_a_second_a_thousand_times_at_most(duration: float, count: int) -> None:
+    plan = planned(duration)
+    path = recording_of(plan, LogOptions()).path
+    assert path is not None
+    assert path.nanoseconds.tolist() == np.rint(np.linspace(0, duration * 1e9, count)).astype(int).tolist()
+    reached = forward(plan.loaded.robot, plan.trajectory(path.nanoseconds * 1e-9))[:, :3, 3]
+    assert path.poses[:, :3] == pytest.approx(reached, abs=1e-9)
+    assert (np.sum(path.poses[1:, 3:] * path.poses[:-1, 3:], axis=1) > 0).all()  # no quaternion jumps
+
+
+@pytest.mark.parametrize(
+    ("options", "start", "message", "hint"),
+    [
+        ({"topics": "/tool_twists"}, 0.0, "there is no topic '/tool_twists'", "did you mean '/tool_twist'"),
+        ({"topics": "/tool_twist"}, 0.0, "robot bare has no geometry", "convention"),
+        ({"epoch": "-5"}, 0.0, "expected seconds since 1970, got '-5'", "not negative"),
+        ({"epoch": "1e9"}, 0.0, "expected seconds since 1970, got '1e9'", "decimal number"),
+        ({}, -0.25, "output.start_time is -0.25 s", "--epoch 0.25 or more makes that possible"),
+        ({"epoch": "1.5"}, -2.0, "output.start_time is -2 s", "--epoch 2 or more makes that possible"),
+        ({"epoch": "2147483648"}, 0.0, "the log would reach 2147483648 s", "small enough"),
+        ({"epoch": "2147483647"}, 0.001, "times of ROS 2 end at 2147483647 s", "small enough"),
+    ],
+)
+def test_what_no_log_can_hold_is_refused_before_anything_is_planned(
+    options: dict[str, str], start: float, message: str, hint: str
+) -> None:
+    with pytest.raises(InputError) as error:
+        check_log_options(LogOptions(**options), BARE, start)  # type: ignore[arg-type]
+    (problem,) = error.value.problems
+    assert message in problem.message
+    assert hint in (problem.hint or "")
+
+
+def test_the_end_must_be_a_time_too_and_topics_may_stand_apart() -> None:
+    check_log_options(LogOptions(epoch="2147483646"), BARE, 0.0)
+    assert recording_of(planned(1.0), LogOptions(epoch="2147483646")).epoch == 2_147_483_646 * 10**9
+    with pytest.raises(InputError, match=r"the log would reach 2147483647\.5"):
+        recording_of(planned(1.5), LogOptions(epoch="2147483646"))
+    asked = LogOptions(topics=" /tool_twist , /joint_trajectory_point")
+    assert asked.names == ("/tool_twist", "/joint_trajectory_point")
+    assert recording_of(planned(1.0), asked).topics == asked.names
