@@ -84,3 +84,47 @@ def test_a_deceleration_says_nothing_of_a_turn_in_place() -> None:
     assert plan.trajectory.duration == pytest.approx(0.5 / 1.0 + 1.0 / 5.0, rel=1e-9)
     assert course.limits_along == (1.0, 5.0, 5.0)
     assert course.bounds(course.rates(np.array([0.2])))(np.zeros((1, 2)))[0, 2] == pytest.approx(-5.0)
+
+
+def speeds_in_zone(plan: Plan) -> np.ndarray:
+    """Return how fast the tool goes within the zone, by differences of its places, m/s."""
+    assert plan.flyby is not None
+    (zone,) = plan.flyby.zones
+    times = np.linspace(zone.entered, zone.left, 2001)
+    places = place(plan.trajectory.curve.evaluate(times))
+    return np.linalg.norm(np.diff(places, axis=0), axis=1) / (times[1] - times[0])
+
+
+@pytest.mark.parametrize("speeds", few([(0.1, 0.15), (0.15, 0.1)], 1))
+def test_in_a_zone_the_higher_of_the_speeds_that_two_laws_name_is_kept(speeds: tuple[float, float]) -> None:
+    """Joints alone would go far faster there; a law that names none leaves it to them."""
+    laws = [{"speed": speed, "shape": "time_optimal"} for speed in speeds]
+    plan = flown(*laws, limits={**FREE, "jerk": 200})
+    inside = speeds_in_zone(plan)
+    assert inside.max() <= 0.15 * (1 + 1e-6)
+    assert inside.max() > 0.12
+    free = flown(laws[0], {"shape": "time_optimal"}, limits={**FREE, "jerk": 200})
+    assert speeds_in_zone(free).max() > 0.2
+    assert free.flyby is not None
+    assert plan.flyby is not None
+    assert plan.trajectory.duration < plan.flyby.stopping * 0.99
+
+
+def test_a_zone_at_a_low_speed_of_the_tool_is_flown_by_nearly_at_that_speed() -> None:
+    """The way is no shorter than what lies outside of the ball and a chord of it, at 100 mm/s."""
+    law = {"shape": "time_optimal", "speed": 100}
+    job = {
+        "version": 1,
+        "units": {"angle": "deg", "length": "mm"},
+        "robot": "ur5e",
+        "limits": {"acceleration": 800, "jerk": 8000},
+        "zone": 50,
+        "start": {"xyz": [400, 100, 250], "rpy": [180, 0, 0], "configuration": {"elbow": "up"}},
+        "moves": [
+            {"planner": "line", "to": {"xyz": xyz}, "law": law}
+            for xyz in ([400, -100, 250], [600, -100, 250])
+        ],
+    }
+    plan = plan_job(job_from_text(json.dumps(job)))
+    least = (150 + 150 + 50 * np.sqrt(2)) / 100
+    assert least < plan.trajectory.duration < 1.05 * least

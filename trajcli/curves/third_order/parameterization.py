@@ -189,7 +189,7 @@ class _Search:
         """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
         self._step(_FIRST_GAP)
         self._converge(_FIRST_STEPS, hopeless)
-        if self.excess.max() > hopeless:
+        if self.excess.max() > hopeless and self.limits.excess(self.best).max() > hopeless:
             raise self.unsettled()
         if self.rests and self.excess.max() > _NEARLY:  # where much is passed, steps may lead nowhere
             self._take(self.best.slowed(self.stretch))
@@ -237,7 +237,7 @@ class _Search:
         lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, min(self.slower, _SETTLED))
         best, idle = self.stretch, 0
         for step in range(steps):
-            if _stretch(self.excess) <= 1.0 + enough or (self.hasty and idle > _IDLE):
+            if _stretch(self.excess) <= 1.0 + enough or (self.hasty and idle > _IDLE and best > 1.0 + _NEAR):
                 break
             # what is left after many steps may be the bound's own: it is nearer in shorter pieces
             passed = 1.0 if step and step % _SETTLING == 0 else _STUBBORN

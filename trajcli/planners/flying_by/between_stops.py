@@ -101,9 +101,7 @@ def chain_of(
         for k, course in enumerate(courses)
     ]
     corners = [
-        CornerZone(
-            around, stretches[k][1], stretches[k + 1][0], _inside(courses[k].robot, courses[k + 1].robot)
-        )
+        CornerZone(around, stretches[k][1], stretches[k + 1][0], _inside(courses[k], courses[k + 1]))
         for k, around in enumerate(zones)
     ]
     return FlyByChain(tuple(courses), tuple(corners), ends, (1.0,) * len(courses))
@@ -115,11 +113,17 @@ def _border(course: Course, around: ZoneAround, size: float, *, before: bool) ->
     return border(lambda s: smaller.shares(course.curve.evaluate(s)), course.length, before=before)
 
 
-def _inside(before: Robot, after: Robot) -> Robot:
-    """Return the arm with the limits inside a zone: of joints the higher, of the tool the lower ones."""
-    tools = [vars(robot.limits.tcp) for robot in (before, after)]
+def _inside(before: Course, after: Course) -> Robot:
+    """Return the arm with the limits inside a zone: of joints the higher, of the tool the lower ones.
+
+    Of speeds that laws name the higher one counts.
+    """
+    robots, named = (before.robot, after.robot), [vars(course.tcp) for course in (before, after)]
+    tools = [vars(robot.limits.tcp) for robot in robots]
+    for key in ("speed", "angular_speed"):
+        tools.append({**tools[0], key: max(tool[key] for tool in named)})
     tcp = ToolLimits(**{key: min(tool[key] for tool in tools) for key in tools[0]})
-    looser = with_looser_limits(before, after)
+    looser = with_looser_limits(*robots)
     return replace(looser, limits=replace(looser.limits, tcp=tcp))
 
 

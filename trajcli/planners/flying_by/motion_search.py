@@ -92,7 +92,7 @@ class MotionSearch:
         self.chain: FlyByChain
         self.model = math.inf
         self._paces: dict[int, float] = {}
-        self._lowering, self._expected = 0.0, math.inf  # s, the latter without laws
+        self._lowering = 0.0
         self._near: Array | None = None
         self._zones: dict[tuple[object, ...], tuple[list[Finding], Array]] = {}
         self._laws, self._stopping = laws, StoppingLaws(laws)
@@ -137,21 +137,21 @@ class MotionSearch:
     def _eased(chain: FlyByChain) -> Array:
         return np.array([1.0 if course.uniform else _EASED for course in chain.courses])
 
-    def by_pace(self, chain: FlyByChain, *, anyway: bool) -> MotionSearch | None:
+    def by_pace(self, chain: FlyByChain, least: float) -> MotionSearch | None:
         """Return a search in which limits of the tool lower the pace of zones, if that looks faster.
 
         Args:
             chain: That was searched, its zones not lowered.
-            anyway: Whether it need not look faster.
+            least: How long its motion lasts, s; infinite where there is none.
         """
         other = MotionSearch(self._laws, by_order=False)
         other.chain, other._near, other._zones = chain, self._near, self._zones
         try:
-            other._searched(self._eased(chain), roughly=True)
+            expected = other._searched(self._eased(chain), roughly=True)[0].duration
         except PlanningError:
             return None
         other._paces, other._lowering = self._paces, 0.0
-        return other if anyway or other._expected < self._expected else None
+        return other if expected <= least else None
 
     def _flown(self, row: ChainRow, found: FoundStates) -> tuple[FoundStates, list[FlownPart]]:
         """Return the parts of a motion, and its states: those at borders near which laws fail are calmed."""
@@ -263,8 +263,6 @@ class MotionSearch:
                 self._near, before = found.states, found.duration
                 if turn + 1 < _LOWERINGS and self._lowered(found.states):
                     break
-                if math.isinf(self._expected):
-                    self._expected = found.duration
                 if roughly:
                     return found, row
             else:

@@ -280,7 +280,8 @@ def _within_limits(
         if not search.lowered:
             break
         whole = chain_of(courses, zones, ends, [1.0] * len(zones))
-        search = search.by_pace(straightened(whole).joined, anyway=not found)
+        least = duration_of(found[0][1]) if found else np.inf
+        search = search.by_pace(straightened(whole).joined, least)
     if not found:
         raise errors[0]
     return min(found, key=lambda each: duration_of(each[1]))
