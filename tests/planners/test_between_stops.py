@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,14 @@ from tiers import few
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.kinematics.zone import Zone, ZoneAround
-from trajcli.planners.flying_by.between_stops import CornerZone, border, chain_of, shared, with_looser_limits
+from trajcli.planners.flying_by.between_stops import (
+    CornerZone,
+    _inside,
+    border,
+    chain_of,
+    shared,
+    with_looser_limits,
+)
 from trajcli.planners.joint_course import joint_line
 
 QUANTITIES = ("velocity", "acceleration", "jerk")
@@ -152,3 +160,24 @@ def test_at_its_pace_a_motion_uses_no_more_than_the_parts_of_limits_and_of_one_a
     for name, share in zip(QUANTITIES, shares, strict=True):
         np.testing.assert_allclose(getattr(corner.limits, name), share * getattr(robot.limits, name))
     np.testing.assert_array_equal(corner.limits.position, robot.limits.position)
+
+
+def test_inside_a_zone_the_higher_of_two_speeds_that_laws_name_counts_beside_limits_of_the_tool() -> None:
+    rng = np.random.default_rng(3)
+    robots = [arm(rng), arm(rng)]
+    free, slow, fast = (
+        ToolLimits(),
+        ToolLimits(speed=0.1, acceleration=0.4, angular_speed=0.3),
+        ToolLimits(speed=0.2, acceleration=0.5, angular_speed=0.2),
+    )
+    limits = [robot.limits.tcp for robot in robots]
+    for laws, speeds in (
+        ((slow, fast), (0.2, 0.3)),
+        ((fast, slow), (0.2, 0.3)),
+        ((slow, free), [min(getattr(each, name) for each in limits) for name in ("speed", "angular_speed")]),
+    ):
+        courses = [SimpleNamespace(robot=robot, tcp=law) for robot, law in zip(robots, laws, strict=True)]
+        inside = _inside(*courses).limits.tcp  # type: ignore[arg-type]
+        assert (inside.speed, inside.angular_speed) == tuple(speeds)
+        for name in ("acceleration", "jerk", "angular_acceleration", "angular_jerk"):
+            assert getattr(inside, name) == min(getattr(each, name) for each in limits)
