@@ -30,6 +30,7 @@ from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 _NEXT_TO_NOTHING = 1e-6  # of a limit: a joint that uses no more may be moved by rounding alone
 _HOPELESS = 1.3  # times a limit after the first steps of a law between states
 _LONGER = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
+_LONGEST = 1e9  # s, of what no limit of duration is known
 _SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
 _FAR, _FAR_SPEED = 1.6, 1.03  # times a limit, a possible speed
 _SAMPLES = 9  # of a straight line, its ends included, at which bounds of its law are looked at
@@ -292,7 +293,7 @@ def _least_duration(problem: BoundaryProblem) -> float:
         return fastest(problem).duration
     except PlanningError:
         (_, before, change), (_, behind, _) = problem.initial, problem.final
-        return abs(behind - before) / abs(change) if change else 0.0
+        return min(abs(behind - before) / abs(change), _LONGEST) if change else 0.0
 
 
 def _hardly_moves(problem: BoundaryProblem) -> bool:
