@@ -234,13 +234,10 @@ def _from_table(table: Table, robot: Robot) -> Measurements:
     zero = np.zeros(len(joints))
     position = np.stack([zero if values is None else values for values in axes], axis=1)
     refuse_large(position, table)
-    rotation = (
-        None
-        if missing
-        else matrix_from_quaternion(
-            unit_quaternions(np.stack([v for v in turns if v is not None], axis=1), table)
-        )
-    )
+    rotation = None
+    if not missing:
+        rows = np.stack([values for values in turns if values is not None], axis=1)
+        rotation = matrix_from_quaternion(unit_quaternions(rows, table))
     x, y, z = measured
     target = partial_target(position, fixed=(x, y, z), rotation=rotation)
     deviations = _table_deviations(table, columns, any(measured), rotation is not None)

@@ -162,7 +162,12 @@ WRONG = [
     ("  - call: plac\n", 2, "there is no sequence 'plac'", "did you mean 'place'?"),
     ("  - {repeat: slot, moves: [{call: place}], lable: x}\n", 2, "unknown key 'lable'", "label"),
     ("  - {repeat: corner, moves: [{call: place}]}\n", 2, "'corner' is not many itself", "slot"),
-    ("  - {repeat: above, moves: [{call: place}]}\n", 2, "'above' is not many itself", "repeat slot"),
+    (
+        "  - {repeat: above, moves: [{call: place}]}\n",
+        2,
+        "'above' is not many itself",
+        "write `repeat: slot`",
+    ),
     ("  - {repeat: 0, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
     ("  - {repeat: true, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
     (

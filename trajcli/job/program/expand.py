@@ -229,8 +229,8 @@ class _Expansion:
                 raise self._names.refused(f"{message}, got {node.text or 'a value of another kind'}", path)
             if node.value not in counts:
                 hint = did_you_mean(node.value, counts) or valid_names(counts, "names that are many")
-                if needed := " and ".join(self._names.needs(node.value)):
-                    hint = f"it is one for each of {needed}: repeat {needed}"
+                if needed := self._names.needs(node.value):
+                    hint = "write " + ", and within it ".join(f"`repeat: {one}`" for one in needed)
                 message = f"'{node.value}' is not many itself"
                 raise self._names.refused(message, path, hint or "no point of the job is a grid or a list")
         names = tuple(str(node.value) for node in listed)
