@@ -18,7 +18,7 @@ from trajcli.errors import PlanningError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
-from trajcli.kinematics.robot import Limits, Robot
+from trajcli.kinematics.robot import Limits
 from trajcli.limits.kinds import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
@@ -138,8 +138,8 @@ def _within_tightest(
         found = _along_line(course, tight, stretch, states, index)
     except PlanningError:
         return None, False
-    curve, robot = found.curve, course.robot
-    if _findings(curve, MoveInterval(0.0, curve.duration, robot, found.tool), robot, 0):
+    curve = found.curve
+    if _findings(curve, MoveInterval(0.0, curve.duration, course.robot, found.tool), 0):
         return None, False
     enough = float(typical.durations(states[:1], states[1:])[0, 0])
     return found, curve.duration <= enough * (1 + _CLOSE)
@@ -150,7 +150,7 @@ def flown_parts(
     row: ChainRow,
     states: Array,
     laws: CourseLaws,
-    known: Mapping[int, FlownPart] | None = None,
+    given: Mapping[int, FlownPart] | None = None,
     doubtful: Collection[int] = (),
 ) -> list[FlownPart]:
     """Return the parts of the motion with given states at the nodes: courses and zones in turns.
@@ -160,14 +160,14 @@ def flown_parts(
         row: As its nodes and parts.
         states: sd and sdd at the nodes, the ends included, (N, 2).
         laws: Of courses.
-        known: Motions along courses that are known, by number.
+        given: Motions along courses that are known, by number.
         doubtful: Courses that are tried first: where they fail, no others are.
 
     Raises:
         NoLawError: When some courses have no law between their borders.
         PlanningError: When some zone has no motion.
     """
-    courses, numbers = dict(known or {}), range(len(chain.courses))
+    courses, numbers = dict(given or {}), range(len(chain.courses))
     for some in ([k for k in numbers if k in doubtful], numbers):
         failed: list[NoLawError] = []
         for k in some:
@@ -253,9 +253,8 @@ def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> Flow
         BoundaryProblem(name, tuple(first), tuple(last), bound.reshape(3, 2))
         for name, first, last, bound in zip(names, ends[0].tolist(), ends[1].tolist(), bounds, strict=True)
     ]
-    rests = [_hardly_moves(problem) for problem in problems]
-    rests = [False] * len(rests) if all(rests) else rests  # the zone itself is next to nothing
-    moving = [problem for problem, rest in zip(problems, rests, strict=True) if not rest]
+    moving = [problem for problem in problems if not _hardly_moves(problem)]
+    moving = moving or problems  # the zone itself is next to nothing
     try:
         profiles = together(moving, [fastest(problem) for problem in moving])
     except PlanningError:
@@ -263,13 +262,10 @@ def _through(ends: Sequence[Array], bounds: Array, names: Sequence[str]) -> Flow
         if slow is None:
             raise
         return FlownPart(merge_breaks(slow))
-    duration = max(profile.duration for profile in profiles)
-    others = iter(profiles)
-    curves = [
-        _quintic(problem, duration) if rest else next(others).curve()
-        for problem, rest in zip(problems, rests, strict=True)
-    ]
-    return FlownPart(merge_breaks(curves))
+    curves = {problem.name: profile.curve() for problem, profile in zip(moving, profiles, strict=True)}
+    duration = profiles[0].duration
+    every = [curves.get(problem.name) or _quintic(problem, duration) for problem in problems]
+    return FlownPart(merge_breaks(every))
 
 
 def _slow_quintics(problems: Sequence[BoundaryProblem]) -> list[PiecewisePolynomial] | None:
@@ -332,10 +328,11 @@ def zone_motion(chain: FlyByChain, number: int, states: Array) -> FlownPart:
 
 def findings_of(chain: FlyByChain, number: int, part: FlownPart) -> list[Finding]:
     """Return what is wrong with a part: courses and zones are counted in turns."""
-    return _findings(part.curve, move_part(chain, number, part, 0.0), chain.courses[0].robot, number)
+    return _findings(part.curve, move_part(chain, number, part, 0.0), number)
 
 
-def _findings(curve: PiecewisePolynomial, one: MoveInterval, robot: Robot, number: int) -> list[Finding]:
+def _findings(curve: PiecewisePolynomial, one: MoveInterval, number: int) -> list[Finding]:
+    robot = one.robot
     span = Span(number, "zone" if number % 2 else "course", curve.start, curve.end, 2, robot.payload)
     ends = state_at(curve, curve.start), state_at(curve, curve.end)
     trajectory = Trajectory(curve, robot.joint_names, robot.joint_types, (span,), *ends)

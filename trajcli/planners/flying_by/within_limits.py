@@ -19,7 +19,7 @@ from trajcli.curves.operations import cut, times_at
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.kinematics.zone import Zone, ZoneAround
 from trajcli.planners.boundary_states import missing_limit
 from trajcli.planners.course import Course
@@ -36,7 +36,6 @@ _MORE = 1e-6  # beyond what is needed
 _LESS = 0.8  # where nobody knows how much is needed
 _SLOWEST = 0.05  # slower parts are stopped at instead
 _PARALLEL = 1e-12  # relative: a direction that differs by less is the same
-_LIMITS = ("velocity", "acceleration", "jerk")
 
 
 @frozen
@@ -70,16 +69,19 @@ class StraightenedChain:
         return parts
 
     def _cut(self, part: FlownPart, first: int, last: int) -> list[FlownPart]:
-        law, rest, parts = part.law, part.curve, []
+        law, behind, parts = part.law, part.curve, []
         if law is None:
             return [part]
         for k in range(first, last):
             sides = (k, self.chain.corners[k].left), (k + 1, self.chain.corners[k].joined)
             borders = [_on_line(self.chain, (first, last), *side) for side in sides]
             for time in times_at(law, np.array(borders)).tolist():
-                before, rest = cut(rest, time)
+                try:
+                    before, behind = cut(behind, time)
+                except ValueError:
+                    raise PlanningError("a zone is passed in less time than numbers can tell") from None
                 parts.append(FlownPart(before.shifted(-before.start)))
-        return [*parts, FlownPart(rest.shifted(-rest.start))]
+        return [*parts, FlownPart(behind.shifted(-behind.start))]
 
 
 def straightened(chain: FlyByChain) -> StraightenedChain:
@@ -118,7 +120,7 @@ def _goes_on(before: Course, behind: Course) -> bool:
     one, other = (course.curve.coefficients[0, 0] for course in (before, behind))
     sizes = float(np.linalg.norm(one) * np.linalg.norm(other))
     limits = before.robot.limits, behind.robot.limits
-    same = all(np.array_equal(*(getattr(each, name) for each in limits)) for name in _LIMITS)
+    same = all(np.array_equal(*(getattr(each, name) for each in limits)) for name in QUANTITIES[1:])
     apart = np.abs(one / np.linalg.norm(one) - other / np.linalg.norm(other)).max()
     return same and sizes > 0 and bool(apart <= _PARALLEL)
 
@@ -196,8 +198,7 @@ def duration_within(chain: FlownChain, move: int, robot: Robot) -> float:
     courses = list(chain.chain.courses)
     courses[number] = replace(courses[number], robot=robot)  # type: ignore[type-var]
     zones = [corner.around for corner in chain.chain.corners]
-    _, parts, _ = _within_limits(courses, zones, chain.chain.ends)
-    return duration_of(parts)
+    return duration_of(_within_limits(courses, zones, chain.chain.ends)[1])
 
 
 def second_order_bound(chain: FlownChain) -> float:
@@ -247,10 +248,8 @@ def _require_limits(moves: Sequence[PlannedMove], robots: Sequence[Robot]) -> No
         for quantity in ("velocity", "acceleration"):
             lacking = np.flatnonzero(~np.isfinite(getattr(robot.limits, quantity)).all(axis=1))
             if lacking.size:
-                why = "to fly by a corner"
-                raise missing_limit(
-                    move.planner.tag, quantity, lacking.tolist(), robot, why, "say `zone: stop`"
-                )
+                why = "to fly by a corner", "say `zone: stop`"
+                raise missing_limit(move.planner.tag, quantity, lacking.tolist(), robot, *why)
 
 
 def _rates_along(course: Course, start: State) -> Array:
@@ -291,9 +290,7 @@ def _kept(
     courses: Sequence[Course], zones: Sequence[ZoneAround], ends: tuple[Array, Array], search: MotionSearch
 ) -> tuple[FlyByChain, list[FlownPart]]:
     """Return the fastest chain that a search finds whose parts keep all limits and zones, and its parts."""
-    count = len(zones)
-    sizes = [0] * count
-    shares, tempos = np.ones((count, 3)), np.ones(len(courses))
+    sizes, shares, tempos = [0] * len(zones), np.ones((len(zones), 3)), np.ones(len(courses))
     for _ in range(_ROUNDS):
         chain = chain_of(courses, zones, ends, [_SIZES[size] for size in sizes])
         chain = replace(with_shares(chain, shares), tempos=tuple(tempos.tolist()))
