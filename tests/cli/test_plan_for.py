@@ -262,6 +262,19 @@ def test_a_remedy_in_place_of_for_works_beside_what_the_job_says(
     assert (code, len(out.splitlines()), "for ur-servoj at 500 Hz" in err) == (0, 1252, True)
 
 
+def test_a_remedy_says_that_listed_times_are_to_go(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """`--for` goes before them; a consumer that the job names does not, and no option takes them out."""
+    text = RAMPS.replace("duration: 1", "duration: 2.5, velocity: [45, 15, 5, 1, 1, 1]")
+    listed = job(tmp_path, text + "output: {times: [0, 0.5, 1]}\n")
+    code, _, err = call(capfd, "plan", listed, "--for", "ur-servoj", "--no-output")
+    found = re.search(r"`(--[^`]+)` in place of `--for` and without `output.times` keeps all limits", err)
+    assert (code, found is not None) == (1, True)
+    assert found is not None
+    assert call(capfd, "plan", listed, *shlex.split(found[1]))[0] == 2
+    code, out, err = call(capfd, "plan", job(tmp_path, text), *shlex.split(found[1]))
+    assert (code, len(out.splitlines()), "for ur-servoj at 500 Hz" in err) == (0, 1252, True)
+
+
 def test_what_a_move_concedes_is_said_of_its_phases_in_periods_too(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

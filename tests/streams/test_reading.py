@@ -13,7 +13,7 @@ from trajcli.errors import FileError, InputError
 from trajcli.job.read import load_job
 from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.streams.reading import is_ros_message, read_table
+from trajcli.streams.reading import holds_motion, is_job, is_ros_message, motion_files, read_table
 from trajcli.streams.ros_messages import read_ros_yaml
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -66,6 +66,19 @@ def test_a_goal_that_was_written_is_read(plan, tmp_path):
     )
     assert is_ros_message(tmp_path / "goal.yaml")
     assert not is_ros_message(EXAMPLES / "sync.yaml")
+
+
+@pytest.mark.parametrize("ending", ["yaml", "yml", "json"])
+def test_a_message_is_a_motion_and_no_job_whatever_its_name(ending: str, tmp_path: Path) -> None:
+    """JSON is YAML, too: who draws or checks a file is to take the same for it."""
+    message, job, folder = (tmp_path / f"{name}.{ending}" for name in ("message", "job", "folder"))
+    message.write_text(json.dumps(MESSAGE, indent=2))
+    job.write_text(json.dumps({"version": 1, "robot": {"joints": 1}, "start": {"joints": 0}, "moves": []}))
+    folder.mkdir()
+    assert [holds_motion(path) for path in (message, job, folder)] == [True, False, False]
+    assert [is_job(str(path)) for path in (message, job, folder)] == [False, True, True]
+    assert motion_files(str(tmp_path)) == [str(message)]
+    assert read_table(message).column("q2").tolist() == [1.0, 1.5]
 
 
 WRAPPED = {

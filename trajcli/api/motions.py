@@ -205,9 +205,9 @@ def plot(
     files = [*([str(source)] if plan is None else []), *_listed(over)]
     wanted = None if quantities is None else parse_quantities(",".join(_listed(quantities)))
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
-        known = None if plan is None else plan.loaded.robot.joint_names
+        names = None if plan is None else plan.loaded.robot.joint_names
         sources = [ByteSource(name) for name in files]
-        tables = [read_table(each, joints=known) for each in sources]
+        tables = [read_table(each, joints=names) for each in sources]
         judged = [] if plan is None else [judged_file(each, CheckOptions(), plan) for each in sources]
         judgements = [None if isinstance(each, str) else each.judgement for each in judged]
         picture = picture_of(plan, tables, wanted, tuple(_listed(joints)), judgements)
@@ -324,14 +324,14 @@ def batch(
     from trajcli.batches.processes import run_in_processes
     from trajcli.batches.task import BatchSetup, Task
 
-    most = _processes(processes, timeout)
+    count = _processes(processes, timeout)
     found = find_jobs(_listed(jobs), None if output is None else str(output), form)
     ledgers = Ledgers(found.jobs)
-    known = {} if force else ledgers.known()
-    tasks = [Task(job, known.get(job.output)) for job in found.jobs]
+    entries = {} if force else ledgers.known()
+    tasks = [Task(job, entries.get(job.output)) for job in found.jobs]
     setup = BatchSetup(form, found.owners(), rows, consumer, strict)
     outcomes: list[JobOutcome] = []
-    count = min(most, len(tasks))
+    count = min(count, len(tasks))
     try:
         with closing(run_in_processes(tasks, setup, count, timeout, lambda: None)) as done:
             for outcome in done:
@@ -381,7 +381,7 @@ def sweep(
     from trajcli.job.dump import mapping_text
     from trajcli.job.yaml.source import read_bytes
 
-    most = _processes(processes, timeout)
+    count = _processes(processes, timeout)
     if isinstance(job, Mapping) or (isinstance(job, str) and is_yaml(job)):
         file, content = "<text>", (mapping_text(job) if isinstance(job, Mapping) else job).encode()
     else:
@@ -394,7 +394,7 @@ def sweep(
     table = None if output is None else str(output)
     if table is not None:
         form_of_table(table)
-    count = min(most, len(swept.rows))
+    count = min(count, len(swept.rows))
     ledger = PointLedger(table, force=force)
     rows = dict[int, SweepRow]()
     run = partial(run_in_processes, count=count, timeout=timeout)

@@ -77,7 +77,7 @@ def _report(robot: Robot, joint: int, efforts: MoveEfforts, start: float) -> Eff
         high=high.value,
         high_time=high.time - start,
         bound=(-low.upper_bound, high.upper_bound),
-        limit=(_known(lower), _known(upper)),
+        limit=(_finite(lower), _finite(upper)),
         used=max(used, 0.0) if math.isfinite(min(-lower, upper)) else None,
         head_room=limit - worst.upper_bound if math.isfinite(limit) else None,
         gravity=sign * worst.gravity,
@@ -90,7 +90,7 @@ def _share(peak: EffortPeak) -> float:
     return peak.gravity / peak.value if peak.value else 0.0
 
 
-def _known(bound: float) -> float | None:
+def _finite(bound: float) -> float | None:
     return bound if math.isfinite(bound) else None
 
 
@@ -186,9 +186,9 @@ def _totals(savings: Sequence[Saving], plan: Plan) -> list[SavingReport]:
 
 
 def _saving_report(savings: Sequence[Saving], plan: Plan) -> SavingReport:
-    first, known = savings[0], [one.saved for one in savings if one.saved is not None]
+    first, found = savings[0], [one.saved for one in savings if one.saved is not None]
     duration = math.fsum(plan.moves[one.move].duration for one in savings)
-    saved = None if len(known) < len(savings) else math.fsum(known)
+    saved = None if len(found) < len(savings) else math.fsum(found)
     if saved is not None and abs(saved) <= _NOTHING * duration:
         saved = 0.0
     return SavingReport(

@@ -78,7 +78,7 @@ def payload_capacity(
         InputError: When there is no such move, or no limit of effort is in force in it.
         TrajcliError: Of the job, when it does not even verify without the payload.
     """
-    alone = partial(plan_job, advise=False, known=KnownMoves())  # most moves are the same with every mass
+    alone = partial(plan_job, advise=False, planned=KnownMoves())  # most moves are the same with every mass
     search = _Search(loaded, _carriers(loaded, at), planned or alone)
     low, high = search.bracket_of_stops() or search.bracket()
     if high is None:
@@ -92,9 +92,9 @@ def _carriers(loaded: LoadedJob, at: int | None) -> dict[int, Payload]:
     What is attached keeps its place on the flange: the tcp of another tool sees it elsewhere.
     """
     moves = loaded.job.moves
-    known = f"its moves are 0 to {len(moves) - 1}"
+    hint = f"its moves are 0 to {len(moves) - 1}"
     if at is not None and not 0 <= at < len(moves):
-        raise InputError(f"--at {at}: {loaded.name} has no such move", hint=known)
+        raise InputError(f"--at {at}: {loaded.name} has no such move", hint=hint)
     held, taken, robot = dict[int, Payload](), dict[int, int](), loaded.robot
     for index, planner in enumerate(moves):
         robot = planner.equipped(robot)
@@ -162,9 +162,9 @@ class _Search:
 
     def bracket(self) -> tuple[float, float | None]:
         """Return a mass that verifies and one above it, as near as they get, that does not; None: any."""
-        feasible, plan = self.feasible_mass()
+        low, plan = self.feasible_mass()
         self.require_limits(plan)
-        low, high = self._bracket(feasible, plan)
+        low, high = self._bracket(low, plan)
         return (low, None) if high is None else self.closed(low, high)
 
     def bracket_of_stops(self) -> tuple[float, float | None] | None:
@@ -184,10 +184,9 @@ class _Search:
             return None
         return low, high
 
-    def _bracket(self, feasible: float, plan: Plan) -> tuple[float, float | None]:
+    def _bracket(self, low: float, plan: Plan) -> tuple[float, float | None]:
         """Return a mass that verifies and one above it that does not; None where any does."""
-        low = feasible
-        guesses = sorted(mass for mass in self._guesses(plan) if feasible < mass < LARGEST)
+        guesses = sorted(mass for mass in self._guesses(plan) if low < mass < LARGEST)
         near = [mass * factor for mass in guesses for factor in (1 - _GUESS, 1 + _GUESS)]
         beyond = 2.0 ** np.arange(-3, np.ceil(np.log2(LARGEST)) + 1)
         for mass in sorted({*near, *(beyond * max([1.0, *guesses])).tolist()}):

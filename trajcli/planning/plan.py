@@ -105,7 +105,7 @@ def plan_job(
     *,
     advise: bool = True,
     adapted: Adaptation | None = None,
-    known: KnownMoves | None = None,
+    planned: KnownMoves | None = None,
 ) -> Plan:
     """Return the plan of a job, with its verdict: a verdict with findings is no error here.
 
@@ -114,7 +114,7 @@ def plan_job(
         carried: What the tool carries in a move instead, by its index and what the job says.
         advise: Whether findings come with what would help, which is tried out.
         adapted: By what moves are planned otherwise than their limits alone say.
-        known: Moves of other plans of the job that need not be planned anew; those of this one are added.
+        planned: Moves of other plans of the job that need not be planned anew; those of this one are added.
 
     Raises:
         InputError: When a move loosens a limit, or lacks one it needs.
@@ -126,7 +126,7 @@ def plan_job(
         from trajcli.planning.flown_job import flown_corners, flown_plan
 
         corners = flown_corners(loaded)  # one that cannot be is refused before anything is planned
-    moves = _plan_moves(loaded, poses, carried, adapted, known or KnownMoves())
+    moves = _plan_moves(loaded, poses, carried, adapted, planned or KnownMoves())
     flyby, of_corners = None, list[Event]()
     if corners is not None:
         moves, flyby, of_corners = flown_plan(loaded, moves, corners, adapted)
@@ -165,7 +165,7 @@ def _plan_moves(
     poses: dict[int | None, ResolvedPose],
     carried: Carried | None,
     adapted: Adaptation | None,
-    known: KnownMoves,
+    planned: KnownMoves,
 ) -> list[PlannedMove]:
     """Return the moves of a job, and note how its poses are reached."""
     moves, lacking = list[PlannedMove](), list[Problem]()
@@ -187,12 +187,12 @@ def _plan_moves(
         try:
             with _errors_of(loaded, index, planner, begun):
                 there = placed(loaded, planner, robot, state.position, standing)
-                move = _repeated(loaded, index, start, motion, known, poses, adapted)
+                move = _repeated(loaded, index, start, motion, planned, poses, adapted)
                 if move is None:
                     reachable = there.with_joint_targets(partial(resolve, index=index), state.position)
                     with _points_of_errors(loaded, index):
                         move = _plan_move(loaded, used, index, reachable.coming_from(origin), start, adapted)
-                    known.moves[motion] = move, poses.get(index)
+                    planned.moves[motion] = move, poses.get(index)
             moves.append(move)
             begun += float(move.planned.curve.breaks[-1])
             state = move.planned.end
@@ -220,15 +220,15 @@ def _repeated(
     index: int,
     start: State,
     motion: tuple[object, ...],
-    known: KnownMoves,
+    planned: KnownMoves,
     poses: dict[int | None, ResolvedPose],
     adapted: Adaptation | None,
 ) -> PlannedMove | None:
     """Return a move that is the same motion as one before; None where none is."""
-    move = known.move(index, motion, poses) if adapted is None or adapted.changes_nothing else None
+    move = planned.move(index, motion, poses) if adapted is None or adapted.changes_nothing else None
     if move is not None and adapted is not None:
         grid = (loaded.job.output.rate, loaded.job.output.align)
-        adapted.note_repeated(known.moves[motion][0].index, index, start, grid)
+        adapted.note_repeated(planned.moves[motion][0].index, index, start, grid)
     return move
 
 

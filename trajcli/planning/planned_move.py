@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -73,13 +73,14 @@ class Stand:
         near: Target | None = target
         while near is not None and near.relative is not None:
             near = self.points.get(near.relative.origin)
-        fields: dict[str, Any] = {
-            "relative": None,
-            "near": None if near is None else near.joints,
-            "xyz": tuple(pose[:3, 3].tolist()),
-            "matrix": tuple(map(tuple, pose[:3, :3].tolist())),
-        }
-        return target.model_copy(update=fields)
+        return target.model_copy(
+            update={
+                "relative": None,
+                "near": None if near is None else near.joints,
+                "xyz": tuple(pose[:3, 3].tolist()),
+                "matrix": tuple(map(tuple, pose[:3, :3].tolist())),
+            }
+        )
 
     def _joints(self) -> Array:
         if self.joints is None:
@@ -128,10 +129,10 @@ class KnownMoves:
         self, index: int, motion: tuple[object, ...], poses: dict[int | None, ResolvedPose]
     ) -> PlannedMove | None:
         """Return a move that is the same motion as one before, its pose noted; None where none is."""
-        known = self.moves.get(motion)
-        if known is None:
+        found = self.moves.get(motion)
+        if found is None:
             return None
-        same, pose = known
+        same, pose = found
         if pose is not None:
             poses[index] = pose
         return same if same.index == index else replace(same, index=index)
@@ -139,14 +140,14 @@ class KnownMoves:
 
 def with_tools(spans: Iterable[Span], moves: Iterable[PlannedMove], own: Robot) -> Iterator[Span]:
     """Yield the spans of moves with the tool that is on the flange then, where it is not the first one."""
-    known: dict[tuple[bytes, object], MountedTool] = {}
+    found: dict[tuple[bytes, object], MountedTool] = {}
     first = (own.tool.tobytes(), own.tool_load)
     for span, move in zip(spans, moves, strict=True):
         robot = move.robot
         key = (robot.tool.tobytes(), robot.tool_load)
-        if key != first and key not in known:
-            known[key] = MountedTool(robot.tool, robot.tool_load, robot.tool_name)
-        yield replace(span, tool=known.get(key))
+        if key != first and key not in found:
+            found[key] = MountedTool(robot.tool, robot.tool_load, robot.tool_name)
+        yield replace(span, tool=found.get(key))
 
 
 def handed_over(state: State, before: Planner | None, after: Planner) -> State:
@@ -163,13 +164,13 @@ def handed_over(state: State, before: Planner | None, after: Planner) -> State:
 
 def promises_of(moves: Sequence[PlannedMove]) -> list[Promise]:
     """Return what each move says of itself; rounds that are the same motion say it once."""
-    known: dict[tuple[object, ...], Promise] = {}
+    found: dict[tuple[object, ...], Promise] = {}
     promises = list[Promise]()
     for move in moves:
         key = id(move.planner), id(move.start), id(move.robot), id(move.planned), move.over_limit
-        if key not in known:
-            known[key] = move.promise
-        promises.append(known[key])
+        if key not in found:
+            found[key] = move.promise
+        promises.append(found[key])
     return promises
 
 

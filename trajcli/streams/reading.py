@@ -173,9 +173,9 @@ def format_of_rows(source: ByteSource) -> str:
         InputError: When it is known to be of a format that is not read.
     """
     head = source.head(_HEAD)
-    known = next((kind for pattern, kind in _BY_FIRST_BYTES if pattern.match(head)), None)
-    if known is not None:
-        return known
+    kind = next((kind for pattern, kind in _BY_FIRST_BYTES if pattern.match(head)), None)
+    if kind is not None:
+        return kind
     for magic, (what, hint) in _OTHERS.items():
         if head.startswith(magic):
             raise InputError(f"{source.file} is {what}, which is not read", hint=hint)
@@ -198,7 +198,7 @@ def is_log(path: str | Path) -> bool:
 def holds_motion(path: str | Path) -> bool:
     """Return whether a file is one of rows or messages by its name or first bytes, and no job."""
     ending = Path(str(path)).suffix.lower()
-    return ending in ENDINGS_OF_ROWS or is_log(path) or (ending in _YAML and is_ros_message(path))
+    return ending in ENDINGS_OF_ROWS or is_log(path) or (ending in _OF_JOBS and is_ros_message(path))
 
 
 def is_job(name: str) -> bool:

@@ -92,8 +92,8 @@ def _each(unit: str | list[str], count: int) -> list[str]:
 @cache
 def _in_job(unit: str, angle: AngleUnit, length: LengthUnit) -> tuple[float, str]:
     """Return the SI value of the job's unit that stands for an SI unit, and its name."""
-    start, slash, rest = unit.partition("/")
+    start, slash, per = unit.partition("/")
     if start not in ("rad", "m"):
         return 1.0, unit
     quantity = Quantity("angle" if start == "rad" else "length")
-    return factor(quantity, Units(angle, length)), (angle if start == "rad" else length) + slash + rest
+    return factor(quantity, Units(angle, length)), (angle if start == "rad" else length) + slash + per

@@ -241,8 +241,7 @@ class _Search:
         """Return what the consumer makes of a plan; by rules only where rows keep the limits, or as asked."""
         # the curve is judged by exact numbers; what their decimals make of it is looked at apart
         writing, grid, digits = self._writing, grid_of(plan), self._writing.digits or "fixed"
-        shortest = plan.trajectory.duration if self._shortest is None else self._shortest
-        self._shortest = shortest
+        shortest = self._shortest = self._shortest or plan.trajectory.duration
         rows, decimal = joined_rows(plan, grid, writing.form, "full"), writing.form.decimals
         made = ForConsumer(plan, self._profile, grid, rows, None, None, shortest, digits, decimal)
         if not plan.verdict.passed:
@@ -362,8 +361,8 @@ class _Search:
         duration, rate = first.duration, first.grid.rate
         by_move = StretchedMoves(first.rows, rate, self._begun.fastest)
         longest = np.inf if best is None else best.duration
-        most = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
-        for periods in range(1, min(most, _FEW_THROUGH_ZONES) if self._loaded.job.names_zones else most):
+        count = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
+        for periods in range(1, min(count, _FEW_THROUGH_ZONES) if self._loaded.job.names_zones else count):
             factor = 1 + periods / (rate * duration)
             if by_move.are_over(factor):
                 continue
@@ -404,6 +403,7 @@ class _Search:
 
     def help(self, first: ForConsumer) -> Iterator[str]:
         """Yield what helps, each tried, with its duration."""
+        job, document = self._loaded.job, self._loaded.document
         other = self.other_rows(first)
         if other is not None:
             changed = dict(other[1])
@@ -417,9 +417,11 @@ class _Search:
                     set_columns(columns),
                 ]
                 instead = " in place of `--for`"
+                if job.output.times is None and document.node(("output", "times")) is not None:
+                    instead += " and without `output.times`"
             yield f"`{' '.join(options)}`{instead} keeps all limits, with {first.duration:.6g} s as now"
-        job = self._loaded.job.model_copy(update={"when_over_limit": "slow"})
-        slow = _Search(replace(self._loaded, job=job), self._profile, self._writing, self._carried)
+        slowed = replace(self._loaded, job=job.model_copy(update={"when_over_limit": "slow"}))
+        slow = _Search(slowed, self._profile, self._writing, self._carried)
         slow._begun = self._begun.where_slowed()
         slower = slow.slower(first)
         if slower.keeps:

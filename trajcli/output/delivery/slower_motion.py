@@ -152,16 +152,16 @@ class StretchedMoves:
     that is over a limit is enough for a motion that need not be planned.
     """
 
-    def __init__(self, rows: JoinedRows, rate: float, known: Mapping[Any, PlannedMove]) -> None:
+    def __init__(self, rows: JoinedRows, rate: float, planned: Mapping[Any, PlannedMove]) -> None:
         """Take the moves as they are planned before anything is known of their rows.
 
         Args:
             rows: Of the motion that is not stretched.
             rate: Of the rows, 1/s.
-            known: Its moves by `Adaptation.key`.
+            planned: Its moves by `Adaptation.key`.
         """
         plan, first = rows.plan, Adaptation()
-        moves = [known.get(first.key(move.index, move.start)) for move in plan.moves if move.duration > 0]
+        moves = [planned.get(first.key(move.index, move.start)) for move in plan.moves if move.duration > 0]
         fit = not plan.loaded.job.names_zones and rows.interpolation is not None
         self._moves = [move for move in moves if fit and move is not None and move.at_rest]
         self._rate, self._interpolation = rate, rows.interpolation or "linear"  # without one no move fits
