@@ -136,7 +136,7 @@ def refusal_of(plan: Plan, judged: ProfileJudgement, *, strict: bool) -> Verific
 
 
 def _problem(plan: Plan, finding: Finding) -> Problem:
-    placed = _placed(plan, finding)
+    placed = in_trajectory(plan, finding)
     text = f"{finding.rule}: {finding.message}{counted(finding)}"
     return replace(placed.problem(text, plan.loaded.place_of_move(placed.move or 0)), kind=finding.rule)
 
@@ -146,7 +146,7 @@ def counted(finding: Finding) -> str:
     return f" (and {finding.count - 1} more row{'s' * (finding.count > 2)})" if finding.count > 1 else ""
 
 
-def _placed(plan: Plan, finding: Finding) -> Finding:
+def in_trajectory(plan: Plan, finding: Finding) -> Finding:
     """Return a finding about rows with its time and move in the trajectory, at a border the later move."""
     time = (finding.time or 0.0) - plan.trajectory.start_time
     move = plan.trajectory.span_at(time).index if finding.move is None else finding.move
@@ -158,6 +158,6 @@ def consumer_report(plan: Plan, judged: ProfileJudgement) -> ConsumerReport:
     return ConsumerReport(
         profile=judged.profile.name,
         accepted=judged.accepted,
-        findings=[ConsumerFinding.model_validate(_placed(plan, found)) for found in judged.findings],
+        findings=[ConsumerFinding.model_validate(in_trajectory(plan, found)) for found in judged.findings],
         unjudged=[UnjudgedRule(rule=rule, reason=reason) for rule, reason in judged.unjudged],
     )

@@ -58,19 +58,16 @@ def delivered(
 
             _refuse_events(with_event(plan, joined_rows(plan, grid_of(plan), form, "fixed"), form)[0])
         return plan, "fixed"
-    from trajcli.output.consumer import job_for
+    from trajcli.output.consumer import job_for, refusal_of
     from trajcli.output.delivery.for_consumer import Writing, plan_for, refusal
 
     made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form), carried)
-    if made.plan.verdict.passed and not made.keeps:
-        raise refusal(made, ())
-    if strict and made.plan.verdict.passed:
-        from trajcli.output.consumer import refusal_of
-
-        _refuse_events(made.plan)
-        broken = None if made.rules is None else refusal_of(made.plan, made.rules, strict=True)
-        if broken is not None:
-            raise broken
+    if made.plan.verdict.passed:
+        if strict:
+            _refuse_events(made.plan)
+        broken = None if made.rules is None else refusal_of(made.plan, made.rules, strict=strict)
+        if broken or made.over:
+            raise broken or refusal(made, ())
     return made.plan, made.digits
 
 

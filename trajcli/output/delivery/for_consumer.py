@@ -25,7 +25,7 @@ from trajcli.job.read import LoadedJob
 from trajcli.judge.judgement import Judgement
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.knots import has_knots
-from trajcli.output.consumer import judge_as_written
+from trajcli.output.consumer import in_trajectory, judge_as_written
 from trajcli.output.delivery.joined import joined_rows, rows_that_keep, set_columns
 from trajcli.output.delivery.joined_rows import JoinedRows
 from trajcli.output.write import grid_of
@@ -198,8 +198,9 @@ def refusal(made: ForConsumer, remedies: Iterable[str]) -> VerificationError:
     """Return why rows are not written for a consumer: what is worst, and what helps."""
     plan = made.plan
     found = max(made.over, key=lambda found: found.excess)
-    of_rule, worst = made.rules is not None and found in made.rules.findings, found.said_by(plan.loaded.say)
-    others = len({found.move for found in made.over} - {worst.move})
+    of_rule = made.rules is not None and found in made.rules.findings
+    worst = in_trajectory(plan, found.said_by(plan.loaded.say))
+    others = len({in_trajectory(plan, each).move for each in made.over} - {worst.move})
     more = f" (and in {others} more move{'s' * (others > 1)})" if others else ""
     hint = "; ".join(remedies) or "neither other rows nor a slower motion was found that keeps them"
     text = f"{worst.rule if of_rule else made.where}: {worst.message}{more}"

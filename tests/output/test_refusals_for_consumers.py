@@ -1,0 +1,150 @@
+"""Why rows are not written for a consumer: the worst of what they pass, by scipy's curves, and how little is too much."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from joined_by_scipy import largest_share
+from scipy.interpolate import BPoly
+
+from trajcli.errors import VerificationError
+from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.output.consumer import job_for
+from trajcli.output.delivery.delivered import delivered
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, plan_for, refusal
+from trajcli.output.write import grid_of
+from trajcli.planning.plan import plan_job
+
+ONE: dict[str, Any] = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0]}}
+SEPTIC = [{"planner": "septic", "to": {"joints": [1]}, "duration": 1}]
+
+
+def read(job: dict[str, Any], **output: Any) -> LoadedJob:
+    return job_from_text(json.dumps({**ONE, **job, "output": output}))
+
+
+def made_for(loaded: LoadedJob, profile: str | None = None, writing: Writing | None = None) -> ForConsumer:
+    return plan_for(*job_for(loaded, profile, {"rows": True}), writing or Writing())
+
+
+def joined_share(job: dict[str, Any], **output: Any) -> float:
+    """Return the largest share of a limit that rows use, as scipy joins them."""
+    plan = plan_job(read(job, **output))
+    assert plan.verdict.passed
+    return largest_share(plan, grid_of(plan), 1e-6)
+
+
+@pytest.mark.parametrize(("above", "delivers"), [(-1e-8, True), (2e-5, False), (5e-4, False)])
+def test_rows_that_pass_a_limit_by_little_are_refused_by_more_than_rounding(
+    above: float, delivers: bool
+) -> None:
+    """Cubics through three rows a second of the polynomial of degree seven, whose own acceleration is less."""
+    output = {"for": "ros-jtc", "columns": ["t", "q", "qd"], "rate": 3}
+    highest = 100 * joined_share({"limits": {"acceleration": 100}, "moves": SEPTIC}, **output)
+    assert highest > 9
+    loaded = read({"limits": {"acceleration": highest / (1 + above)}, "moves": SEPTIC}, **output)
+    if delivers:
+        assert made_for(loaded).keeps
+        return
+    with pytest.raises(VerificationError) as refused:
+        made_for(loaded)
+    (problem,) = refused.value.problems
+    assert problem.value is not None
+    assert abs(problem.value) == pytest.approx(highest, rel=1e-6)
+
+
+MOVES = [
+    {"planner": "jerk_limited", "to": {"joints": [to]}, "limits": {"jerk": jerk}}
+    for to, jerk in ((1.0, 40), (0.1, 25), (1.1, 30))
+]
+SLOWLY = {"planner": "quintic", "to": {"joints": [1.2]}, "duration": 3}
+LIMITS = {"velocity": 2, "acceleration": 8, "jerk": 50}
+
+
+def largest_jerk(job: dict[str, Any], limits: list[float]) -> float:
+    """Return the largest share of the jerk of scipy's quintics; between rows of two moves the looser limit is in force."""
+    plan = plan_job(read(job, rate=7))
+    spans, t = (
+        plan.trajectory.spans,
+        np.append(np.arange(0, plan.trajectory.duration, 1 / 7), plan.trajectory.duration),
+    )
+    rows = np.stack([plan.trajectory.curve.evaluate(t, order) for order in range(3)], axis=1)
+    jerk = BPoly.from_derivatives(t, rows).derivative(3)
+    owners = np.searchsorted([span.start for span in spans], t + 1e-9, "right") - 1
+    bounds = np.maximum(
+        np.array(limits)[owners[:-1]], np.array(limits)[np.minimum(owners[1:], len(limits) - 1)]
+    )
+    inside = t[:-1, None] + np.diff(t)[:, None] * np.linspace(1e-9, 1 - 1e-9, 99)
+    return float((np.abs(jerk(inside)[..., 0]).max(axis=1) / bounds).max())
+
+
+@pytest.mark.parametrize(("count", "begins"), [(1, 0.0), (2, 7.0), (3, -2.5)])
+def test_a_refusal_names_the_worst_move_and_counts_the_others(count: int, begins: float) -> None:
+    """The later a move the more of its limit it uses; the time is one of the trajectory, whenever its rows begin."""
+    job = {"limits": LIMITS, "moves": [*MOVES[:count], {**SLOWLY, "to": {"joints": [2]}}]}
+    loaded = read(job, rate=7, start_time=begins)
+    with pytest.raises(VerificationError) as refused:
+        made_for(loaded, "ros-jtc")
+    (problem,) = refused.value.problems
+    others = re.search(r"\(and in (\d) more move(s?)\)", problem.message)
+    assert (others and (int(others[1]), others[2])) == {1: None, 2: (1, ""), 3: (2, "s")}[count]
+    assert (problem.kind, problem.severity, problem.move) == ("jerk", "error", count - 1)
+    assert problem.value is not None
+    assert problem.limit is not None
+    jerks = [float(move["limits"]["jerk"]) for move in MOVES[:count]]  # type: ignore[index]
+    assert problem.value / problem.limit == pytest.approx(largest_jerk(job, [*jerks, 50.0]), rel=1e-6)
+    assert problem.place == loaded.place_of_move(count - 1)
+    assert problem.time is not None
+    spans = plan_job(loaded).trajectory.spans
+    assert spans[count - 1].start <= problem.time <= spans[count - 1].end
+    assert f"at t = {problem.time + begins:.9g} s" in problem.message
+
+
+def test_what_a_consumer_brings_is_said_of_rows_that_are_slowed_too() -> None:
+    job = {
+        "robot": "ur5e",
+        "start": {"joints": [0] * 6},
+        "limits": {"acceleration": 5, "jerk": 60},
+        "when_over_limit": "slow",
+        "moves": [{"planner": "jerk_limited", "to": {"joints": [0.5] * 6}}],
+    }
+    made = made_for(read(job, rate=125), "ur-servoj")
+    assert made.duration > made.shortest
+    assert made.said[0].startswith("ur-servoj takes rows at 500 Hz")
+
+
+@pytest.mark.parametrize(("rate", "digits", "chosen"), [(200, "fixed", False), (400, "full", True)])
+def test_nine_decimals_are_few_where_they_are_a_twentieth_of_a_limit(
+    rate: int, digits: str, chosen: bool
+) -> None:
+    """60 / h^3 of the rounding of two ends: 0.48 and 3.8 of 20 rad/s^3."""
+    limits = {"velocity": 0.1, "acceleration": 1, "jerk": 20}
+    moves = [{"planner": "quintic", "to": {"joints": [0.1]}, "duration": 3}]
+    made = made_for(read({"limits": limits, "moves": moves}, rate=rate), "ros-jtc")
+    assert (made.digits, made.chosen) == (digits, chosen)
+    asked = made_for(read({"limits": limits, "moves": moves}, rate=rate), "ros-jtc", Writing(digits="fixed"))
+    assert (asked.digits, asked.chosen) == ("fixed", False)
+
+
+@pytest.mark.parametrize("begins", [0.0, 7.0])
+@pytest.mark.parametrize("when", ["error", "slow"])
+def test_a_rule_that_no_slowness_keeps_is_refused_where_it_is_broken(when: str, begins: float) -> None:
+    """A motion that ends moving, which the controller of ROS refuses: in its last move, at its end."""
+    moves = [MOVES[0], {"planner": "quintic", "to": {"joints": [2], "velocity": [0.5]}, "duration": 2}]
+    job = {"limits": LIMITS, "moves": moves, "when_over_limit": when}
+    loaded = read(job, rate=7, start_time=begins)
+    made = made_for(loaded, "ros-jtc")
+    end = made.plan.trajectory.duration
+    assert not made.keeps
+    with pytest.raises(VerificationError) as delivery:
+        delivered(loaded, "ros-jtc", rows=True)
+    for error in (refusal(made, ()), delivery.value):
+        (problem,) = error.problems
+        assert (problem.kind, problem.move, problem.severity) == ("jtc-last-velocity", 1, "error")
+        assert problem.time == pytest.approx(end, abs=1e-9)
+        assert problem.place == loaded.place_of_move(1)
+    assert delivery.value.problems[0].hint == "end at rest, with a last velocity of exactly 0.0"
