@@ -249,12 +249,11 @@ def view(
     given = (source,) if beside is None else (source, beside)
     shown = [motion if _is_path(motion) else _plan_of(motion) for motion in given]
     arm = _arm_of(shown, None if robot is None else str(robot))
-    scenes = [_scene_of(motion, arm, meshes) for motion in shown]
-    scene = scenes[0]
-    if beside is not None:
+    scene, *second = [_scene_of(motion, arm, meshes) for motion in shown]
+    if second:
         from trajcli.player.scene import scene_of_two
 
-        scene = scene_of_two(*scenes)
+        scene = scene_of_two(scene, *second)
     page = page_of(scene, compress=compress)
     with whole_file(str(output)) as out:
         out.write(page)

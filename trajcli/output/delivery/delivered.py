@@ -47,21 +47,21 @@ def delivered(
         InputError: When a move loosens a limit, or lacks one it needs; or there is no such consumer.
         PlanningError: When a move has no curve.
     """
-    from trajcli.streams.formats import DEFAULT
-
-    form = form or DEFAULT
     if profile is None and loaded.job.output.consumer is None:
         plan = plan_job(loaded, carried, advise=carried is None)
         if strict and plan.verdict.passed:
             from trajcli.output.delivery.joined import joined_rows, with_event
             from trajcli.output.write import grid_of
+            from trajcli.streams.formats import DEFAULT
 
+            form = form or DEFAULT
             _refuse_events(with_event(plan, joined_rows(plan, grid_of(plan), form, "fixed"), form)[0])
         return plan, "fixed"
     from trajcli.output.consumer import job_for, refusal_of
     from trajcli.output.delivery.for_consumer import Writing, plan_for, refusal
+    from trajcli.streams.formats import DEFAULT
 
-    made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form), carried)
+    made = plan_for(*job_for(loaded, profile, {"rows": rows}), Writing(form or DEFAULT), carried)
     if made.plan.verdict.passed:
         if strict:
             _refuse_events(made.plan)

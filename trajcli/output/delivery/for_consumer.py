@@ -215,7 +215,7 @@ class _Search:
         self, loaded: LoadedJob, profile: Profile, writing: Writing, carried: Carried | None
     ) -> None:
         self._loaded, self._profile, self._writing, self._carried = loaded, profile, writing, carried
-        self._shortest: float | None = None
+        self._shortest = 0.0
         self._first: ForConsumer | None = None
         self._begun = Adaptation()  # what it knows of moves, all that are adapted know
 
