@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.planners.law_events import distance_from_bound, jerk_events, solved_by_convex_steps
+from trajcli.planners.law_events import distance_from_bound, how_found, jerk_events
 
 ROBOT = Robot("r", (Joint("first"), Joint("second")), unlimited(2), None, np.eye(4), np.eye(4))
 
@@ -52,7 +52,15 @@ def test_who_sets_the_bound_is_said() -> None:
 def test_steps_are_counted() -> None:
     words = "the law has 7 pieces after {} convex step{}"
     for steps, ending in ((1, ""), (2, "s")):
-        assert solved_by_convex_steps(motion(1.0, 1.0, steps=steps)).message == words.format(steps, ending)
+        (event,) = how_found(motion(1.0, 1.0, steps=steps, refinements=0))
+        assert event.message == words.format(steps, ending)
+
+
+def test_refinements_of_a_grid_are_counted() -> None:
+    assert not how_found(motion(1.0, 1.0, refinements=0))
+    for count, words in ((1, "once"), (2, "2 times")):
+        (event,) = how_found(motion(1.0, 1.0, refinements=count, grid=np.zeros(101)))
+        assert event.message == f"the grid was refined {words}, to 101 grid points of the path"
 
 
 def test_joints_whose_jerk_differs_by_direction_are_named() -> None:

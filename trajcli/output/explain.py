@@ -231,7 +231,7 @@ def _drawing(tool: ToolMotion) -> tuple[list[SegmentReport], list[CornerReport]]
 
 
 def _weave(tool: ToolMotion) -> WeaveReport | None:
-    if tool.path is None or not tool.path.weaves:
+    if tool.path is None or tool.path.seam is None:
         return None
     weave: Any = getattr(tool.path.poses, "position", None)
     edges = np.diff([0.0, *weave.stops.tolist(), weave.length])

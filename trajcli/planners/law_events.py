@@ -12,16 +12,22 @@ from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Event
 
 if TYPE_CHECKING:
-    from trajcli.curves.third_order.parameterization import JerkLimitedMotion
     from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
 
 _NEXT_TO_NOTHING = 1e-4  # percent
 
 
-def solved_by_convex_steps(motion: JerkLimitedMotion) -> Event:
-    """Return the remark that says how a law was found."""
-    pieces, steps = motion.law.pieces, motion.steps
-    return Event("refined", f"the law has {pieces} pieces after {steps} convex step{'s' * (steps != 1)}")
+def how_found(motion: TimeOptimalMotion) -> list[Event]:
+    """Return the remark that says how a law was found, if any."""
+    steps, count = getattr(motion, "steps", None), motion.refinements
+    if steps is not None:
+        text = f"the law has {motion.law.pieces} pieces after {steps} convex step{'s' * (steps != 1)}"
+    elif count:
+        times = "once" if count == 1 else f"{count} times"
+        text = f"the grid was refined {times}, to {motion.grid.size} grid points of the path"
+    else:
+        return []
+    return [Event("refined", text)]
 
 
 def distance_from_bound(motion: TimeOptimalMotion, robot: Robot, stretch: float = 1.0) -> Event:

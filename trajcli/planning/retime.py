@@ -56,6 +56,7 @@ def _scaled(planned: Planned, factor: float) -> Planned:
         planned,
         curve=scale_time(planned.curve, factor),
         law=planned.law and scale_time(planned.law, factor),
+        binding_phases=planned.binding_phases and factor <= 1 + LITTLE,
         phases=tuple(replace(p, start=p.start * factor, end=p.end * factor) for p in planned.phases),
         arrivals=planned.arrivals and tuple(time * factor for time in planned.arrivals),
         via_points=planned.via_points and planned.via_points.scaled(factor),

@@ -87,14 +87,14 @@ def _welded(surfaces: Sequence[RowSurface]) -> list[_Mesh]:
     ]
 
 
-def _within(meshes: list[_Mesh], most: float) -> list[_Mesh]:
+def _within(meshes: list[_Mesh], size: float) -> list[_Mesh]:
     """Return meshes that are no longer than so many bytes: on the finest grid of some that does it."""
     if not meshes:
         return []
     extent = max(float(np.ptp(mesh.points, axis=0).max()) for mesh in meshes)
     cell = _FINEST * max(extent, 1e-6)
     meshes = [_clustered(mesh, cell) for mesh in meshes]
-    while sum(mesh.size for mesh in meshes) > most and cell < extent:
+    while sum(mesh.size for mesh in meshes) > size and cell < extent:
         cell *= _COARSER
         meshes = [_clustered(mesh, cell) for mesh in meshes]
     return [mesh for mesh in meshes if len(mesh.faces)]

@@ -224,19 +224,19 @@ def test_rules_whose_curvature_jumps_are_refused(rule: Any) -> None:
         require_continuous_curvature(rule)
 
 
-def told(*, fastest: bool = True, **fields: Any) -> dict[str, str]:
+def told(factor: float = 1.0, **fields: Any) -> dict[str, str]:
     """Return what is said of a law, by its kind."""
     motion = {
         "refinements": 0, "grid": np.zeros(101), "stretch": 1.0, "stops": np.zeros(0), "stop_times": np.zeros(0),
         "lower_bound": 1.9, "law": SimpleNamespace(duration=2.0),
     }  # fmt: skip
-    events = list(events_of_law(SimpleNamespace(**motion | fields), robot(), fastest=fastest))  # type: ignore[arg-type]
+    events = list(events_of_law(SimpleNamespace(**motion | fields), robot(), factor))  # type: ignore[arg-type]
     return {event.kind: event.message for event in events}
 
 
 def test_what_is_said_of_a_law() -> None:
     assert list(told()) == ["bound"]
-    assert not told(fastest=False)
+    assert not told(1.5)
     assert "refined once, to 101 grid" in told(refinements=1)["refined"]
     assert "refined 3 times, to 101 grid" in told(refinements=3)["refined"]
 
@@ -252,6 +252,8 @@ def test_a_stretch_by_more_than_a_thousandth_is_told(stretch: float, conceded: b
 )
 def test_of_many_stops_the_first_ten_are_listed(count: int, text: str) -> None:
     assert text in told(stops=np.arange(count), stop_times=np.arange(float(count)))["stops"]
+    slow = told(3.0, stops=np.arange(count), stop_times=np.arange(float(count)) / 3)
+    assert text in slow["stops"]
 
 
 @pytest.mark.parametrize(("lower", "said"), [(0.999, "0.11"), (0.75, "34"), (0.4, "150"), (0.009, "12000")])

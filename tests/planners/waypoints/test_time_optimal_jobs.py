@@ -16,6 +16,8 @@ from trajcli.errors import PlanningError
 from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
 from trajcli.planners.planner import stretched
+from trajcli.planning.retime import with_duration
+from trajcli.planning.sensitivity import times_at_limits
 
 V, A = 2.0, 8.0
 LIMITS = {"velocity": V, "acceleration": A}
@@ -227,6 +229,33 @@ def test_one_job_through_the_command_line(tmp_path, capfd):
             assert json.loads(out)["duration"] == pytest.approx(1.5, rel=1e-4)
         else:
             assert "  which limit binds when (s):\n    0..0.5: acceleration + of j1\n" in out
+
+
+def test_a_law_that_is_slowed_down_is_at_none_of_its_limits():
+    """Limits bind in the fastest motion: of one that lasts twice as long half and a quarter of them are in use."""
+    q = [[0, 0], [1, 1], [2, 0]]
+    fast = fastest(q, path="polyline").moves[0]
+    shares = {(use.joint, use.quantity): use.seconds / fast.duration for use in times_at_limits(fast)}
+    assert sum(shares.values()) == pytest.approx(1, rel=1e-3)
+    for longer in (
+        fastest(q, path="polyline", duration=2 * fast.duration).moves[0],
+        with_duration(fast, 2 * fast.duration),
+    ):
+        assert longer.duration == pytest.approx(2 * fast.duration)
+        assert not times_at_limits(longer)
+        assert not longer.planned.binding_phases
+    for hardly in (
+        fastest(q, path="polyline", duration=1.0005 * fast.duration).moves[0],
+        with_duration(fast, 1.0005 * fast.duration),
+    ):
+        assert hardly.planned.binding_phases
+
+
+def test_stops_of_a_law_that_is_slowed_down_are_when_it_stops():
+    made = fastest([[0, 0], [1, 1], [2, 0.5], [3, 3]], path="polyline", duration=9.0)
+    (text,) = (event.message for event in made.events if event.kind == "stops")
+    times = [float(each) for each in text.partition("t = ")[2].partition(" s of")[0].split(", ")]
+    assert curve_of(made).evaluate(np.array(times)) == pytest.approx(np.array([[1, 1], [2, 0.5]]), abs=1e-4)
 
 
 def test_a_stretch_is_a_concession_from_a_thousandth_on():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 
 from trajcli.curves.operations import times_at
@@ -186,9 +189,11 @@ class ToolPath:
         return self.poses.length
 
     @property
-    def weaves(self) -> bool:
-        """Whether the tool swings about the curve whose arc length s is."""
-        return hasattr(getattr(self.poses, "position", None), "seam")
+    def seam(self) -> ToolPath | None:
+        """The path about which the tool swings; None where it does not."""
+        poses: Any = self.poses
+        seam = getattr(getattr(poses, "position", None), "seam", None)
+        return None if seam is None else replace(self, poses=replace(poses, position=seam))
 
     @property
     def breaks(self) -> Array:

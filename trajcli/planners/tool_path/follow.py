@@ -217,7 +217,6 @@ class FollowingDiagnosis:
         return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
 
     def _regular(self, at: float, most: int | None) -> PlanningError:
-        """Return the error of a regular configuration, in which the tool could go on."""
         message = f"{most} pieces do not meet the tolerance on this path, worst around s = {{place}}"
         hint = "choose a larger `tolerance`, or split the path"
         if most is None:

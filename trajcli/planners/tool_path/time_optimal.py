@@ -34,7 +34,7 @@ from trajcli.planners.effort_limits import (
     lacks_acceleration,
     solved_within_efforts,
 )
-from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
+from trajcli.planners.law_events import distance_from_bound, how_found
 from trajcli.planners.planner import LITTLE, Event, Phase, stretched
 from trajcli.planners.tool_constraint import ToolConstraint, ToolJerkConstraint
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
@@ -46,7 +46,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
 
     Args:
         joints: Along the path.
-        spec: What it names replaces the limits of the tool.
+        spec: What it names replaces the limits of the tool; of a weave it is about the seam.
         tolerance: How near the joints' curve must be.
         planner: Tag for messages.
 
@@ -58,14 +58,15 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     curve = joints.by_s(tolerance)
     _require_acceleration(curve, robot, planner)
     limits, tcp = robot.limits, limits_of_law(spec, robot.limits.tcp, path.speeds)
+    turns, led, seam = path.poses.pure_rotation, tcp, path.seam
     with joints.diagnosed():
-        further = (
-            ToolConstraint(joints.limited_by(tcp), tcp, path.speeds, path.weaves),
-            *path_constraints(curve, robot),
-        )
-
-        turns = path.poses.pure_rotation
-        along = (tcp.angular_speed, tcp.angular_acceleration) if turns else (tcp.speed, tcp.acceleration)
+        further: tuple[PathConstraint, ...] = path_constraints(curve, robot)
+        if seam is not None and path.speeds is None:  # the law is of the seam
+            led = ToolLimits(speed=spec.speed or math.inf, acceleration=spec.acceleration or math.inf)
+            tcp = replace(tcp, speed=limits.tcp.speed, acceleration=limits.tcp.acceleration)
+            further = (ToolConstraint(seam, led), *further)
+        further = (ToolConstraint(joints.limited_by(tcp), tcp, path.speeds, seam is not None), *further)
+        along = (led.angular_speed, led.angular_acceleration) if turns else (led.speed, led.acceleration)
         of_jerk = jerk_constraints(joints, curve, spec)
         keeps_jerk = bool(of_jerk) or _moving(curve)[np.isfinite(limits.jerk).any(axis=1)].any()
 
@@ -79,8 +80,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
 
         solved = solved_within_efforts(curve, robot, solve)
         remaining = _remaining_stretch(robot, solved, tcp, path.speeds)
-    least = spec.minimum_duration or 0.0
-    factor = max(remaining, least / solved.trajectory.duration)
+    factor = max(remaining, (spec.minimum_duration or 0.0) / solved.trajectory.duration)
     law, trajectory = (
         scale_time(each, factor) if factor > 1 else each for each in (solved.law, solved.trajectory)
     )
@@ -96,7 +96,7 @@ def fastest_along(joints: FollowedPath, spec: LawSpec, tolerance: Tolerance, pla
     of_joints = JointConstraint(curve, limits.velocity, limits.acceleration)
     constraints = (of_joints, *further, *effort_constraints(curve, robot))
     breaks = distinct(np.concatenate([curve.breaks, path.breaks]))
-    dimension: Literal["length", "angle"] = "angle" if path.poses.pure_rotation else "length"
+    dimension: Literal["length", "angle"] = "angle" if turns else "length"
     plane = PhasePlane(law, constraints, breaks, solved.stops, dimension)
     return JointMotion(trajectory, motion, tuple(phases), events, plane, 2 if keeps_jerk else 1)
 
@@ -134,16 +134,10 @@ def _moving(curve: PiecewisePolynomial) -> NDArray[np.bool_]:
 
 
 def _events(solved: TimeOptimalMotion, robot: Robot, remaining: float, *, fastest: bool) -> tuple[Event, ...]:
-    """Return how a law was found, how good it is, and where it stops."""
-    events = []
-    if isinstance(solved, JerkLimitedMotion):
-        events.append(solved_by_convex_steps(solved))
-        if count := solved.stops.size:
-            text = f"stops {count} time{'s' * (count != 1)} where the path bends: limits of jerk ask for it"
-            events.append(Event("stops", text))
-    elif solved.refinements:
-        text = f"the grid was refined {solved.refinements} times, to {solved.grid.size} grid points"
-        events.append(Event("refined", text))
+    events, count = how_found(solved), solved.stops.size
+    if count and isinstance(solved, JerkLimitedMotion):
+        text = f"stops {count} time{'s' * (count != 1)} where the path bends: limits of jerk ask for it"
+        events.append(Event("stops", text))
     if fastest:
         events.append(distance_from_bound(solved, robot, remaining))
     stretch = solved.stretch * remaining
@@ -163,7 +157,6 @@ def _remaining_stretch(
 
 
 def _stretch_of_whole(robot: Robot, trajectory: PiecewisePolynomial, limits: ToolLimits) -> float:
-    """Return that by the limits that hold along the whole path."""
     tcp = replace(limits, jerk=np.inf, angular_jerk=np.inf)
     limited = replace(robot, limits=replace(robot.limits, tcp=tcp))
     if not limits_tool(limited):
@@ -175,7 +168,6 @@ def _stretch_of_whole(robot: Robot, trajectory: PiecewisePolynomial, limits: Too
 
 
 def _stretch_by_segment(robot: Robot, solved: TimeOptimalMotion, speeds: SpeedLimits) -> float:
-    """Return that by limits of speed that step along the path."""
     from trajcli.limits.tool_bound import speed_runs
 
     return max(

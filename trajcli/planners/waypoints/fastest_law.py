@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.third_order.curved_paths import with_end_curvature
 from trajcli.curves.third_order.jerk import ThirdOrderConstraint
-from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
+from trajcli.curves.third_order.parameterization import jerk_limited_time_optimal
 from trajcli.curves.third_order.quartic_law import ReversingLawError
 from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
@@ -20,7 +20,7 @@ from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import path_constraints
 from trajcli.planners.effort_limits import solved_within_efforts
-from trajcli.planners.law_events import distance_from_bound, solved_by_convex_steps
+from trajcli.planners.law_events import distance_from_bound, how_found
 from trajcli.planners.planner import LITTLE, Event, stretched
 from trajcli.planners.waypoints.joint_path import JointPath
 from trajcli.planners.waypoints.spline_rules import Rule
@@ -157,28 +157,21 @@ def _require_along(across: Array, acceleration: Array, robot: Robot) -> None:
     raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
 
 
-def events_of_law(motion: TimeOptimalMotion, robot: Robot, *, fastest: bool) -> Iterator[Event]:
+def events_of_law(motion: TimeOptimalMotion, robot: Robot, factor: float) -> Iterator[Event]:
     """Yield how good a law is, how it was found, and where it stops.
 
     Args:
         motion: With the law.
         robot: For the names of joints.
-        fastest: Whether it is not slowed down.
+        factor: By which it is slowed down.
     """
-    if isinstance(motion, JerkLimitedMotion):
-        yield solved_by_convex_steps(motion)
-    elif motion.refinements:
-        yield Event(
-            "refined",
-            f"the grid was refined {'once' if motion.refinements == 1 else f'{motion.refinements} times'}, "
-            f"to {motion.grid.size} grid points of the path",
-        )
-    if fastest:
+    yield from how_found(motion)
+    if factor == 1.0:
         yield distance_from_bound(motion, robot)
     if motion.stretch > 1 + LITTLE:
         yield stretched(motion.stretch)
     if motion.stops.size:
-        times = ", ".join(f"{time:.6g}" for time in motion.stop_times[:_MOST_STOPS].tolist())
+        times = ", ".join(f"{time:.6g}" for time in (factor * motion.stop_times[:_MOST_STOPS]).tolist())
         more = ", ..." if motion.stops.size > _MOST_STOPS else ""
         count = motion.stops.size
         text = f"stops at {count} corner{'s' * (count != 1)}, at t = {times}{more} s of the move"

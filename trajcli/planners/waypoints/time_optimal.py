@@ -35,7 +35,7 @@ from trajcli.language.recorded import Recorded
 from trajcli.limits.kinds import path_constraints
 from trajcli.planners.boundary_states import missing_limit, same_state, standstill
 from trajcli.planners.effort_limits import effort_constraints, effort_shares, lacks_acceleration
-from trajcli.planners.planner import Phase, Planned
+from trajcli.planners.planner import LITTLE, Phase, Planned
 from trajcli.planners.waypoints.fastest_law import (
     BENT_RULES,
     events_of_law,
@@ -242,8 +242,8 @@ class TimeOptimal(ThroughPoints):
                 for b in binding
             ),
             via_points=ViaPoints(passed * factor, points.positions, path.missed),
-            events=(*points.events, *path.events, *events_of_law(motion, robot, fastest=factor == 1.0)),
-            binding_phases=True,
+            events=(*points.events, *path.events, *events_of_law(motion, robot, factor)),
+            binding_phases=factor <= 1 + LITTLE,
             remedies=REMEDIES,
             phase_plane=self._phase_plane(path, motion, robot).scaled(factor),
             continuity=1 if jerk is None else 2,
