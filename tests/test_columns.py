@@ -10,11 +10,15 @@ from trajcli.columns import (
     TOOL_COLUMNS,
     Column,
     columns_of,
+    group_factors,
+    group_of,
     joint_factors,
+    kinds_of,
     parse_column,
+    require_finite,
     whole_number_columns,
 )
-from trajcli.errors import InputError
+from trajcli.errors import InputError, TrajcliError
 from trajcli.units import Quantity, Units, factor
 
 JOINTS = ("revolute", "revolute", "prismatic")
@@ -103,3 +107,50 @@ def test_only_move_is_written_without_decimals():
 def test_a_choice_that_cannot_be_written_is_refused(groups, message):
     with pytest.raises(InputError, match=message):
         columns_of(groups, JOINTS, Units())
+
+
+NAMES = """t q1_deg q2_deg q3_mm qd1_deg qd2_deg qd3_mm qdd1_deg qdd2_deg qdd3_mm qddd1_deg qddd2_deg qddd3_mm
+x_mm y_mm z_mm qw qx qy qz vx_mm vy_mm vz_mm wx_deg wy_deg wz_deg ax_mm ay_mm az_mm ex_deg ey_deg ez_deg
+s_mm sd_mm sdd_mm tau1 tau2 tau3 zone signal.on signal.t move"""
+OF_GROUPS = dict(zip(GROUPS, (1, 3, 3, 3, 3, 7, 6, 6, 3, 3, 1, 2, 1), strict=True))
+ORDERS = {"q": 0, "qd": 1, "qdd": 2, "qddd": 3, "twist": 1, "twistd": 2}
+
+
+def test_the_groups_have_the_columns_of_the_job_language():
+    """Names, order, units and derivatives as JOB.md lists them: efforts and counts have no unit in their name."""
+    columns = columns_of(GROUPS, JOINTS, Units("deg", "mm"), ("on", "t"))
+    assert [column.name for column in columns] == NAMES.split()
+    groups = [group for group, count in OF_GROUPS.items() for _ in range(count)]
+    for column, group in zip(columns, groups, strict=True):
+        assert group_of(column) == group_of(parse_column(column.name)) == group
+        assert column.quantity is not None
+        assert column.whole_numbers == (column.name in ("zone", "move"))
+        order = {"sd": 1, "sdd": 2}.get(column.kind, ORDERS.get(group, 0))
+        dimension = {"deg": "angle", "mm": "length"}.get(column.unit)
+        if dimension is not None:
+            assert column.quantity == Quantity(dimension, order)
+    assert [c.quantity.dimension for c in columns if c.kind == "tau"] == ["torque", "torque", "force"]
+    assert parse_column("signal.t") == Column("signal.t", None, None, RATIO)
+    assert parse_column("tau2_deg").joint is None
+    assert parse_column("tau12") == Column("tau", 11)
+    assert group_of(Column("weight")) == "weight"
+
+
+def test_columns_beside_those_of_joints_have_their_own_kinds_and_factors():
+    assert kinds_of("path") == ("s", "sd", "sdd")
+    assert kinds_of("twist") == ("vx", "vy", "vz", "wx", "wy", "wz")
+    assert kinds_of("q") == kinds_of("none") == ()
+    units = Units("deg", "mm")
+    np.testing.assert_allclose(group_factors("twist", units), [1e-3] * 3 + [math.pi / 180] * 3)
+    np.testing.assert_allclose(group_factors("pose", units), [1e-3] * 3 + [1.0] * 4)
+    np.testing.assert_allclose(group_factors("twistd", Units()), [1.0] * 6)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_the_first_row_that_is_not_finite_is_told(value):
+    columns = columns_of(("t", "q"), JOINTS, Units())
+    rows = np.zeros((4, 4))
+    require_finite(rows, columns, 100)
+    rows[2, 3] = rows[3, 1] = value
+    with pytest.raises(TrajcliError, match=f"q3 is {value} in row 102"):
+        require_finite(rows, columns, 100)

@@ -127,9 +127,9 @@ def parse_column(name: str) -> Column:
     stem, unit = (parts["stem"], parts["unit"]) if parts else (name, None)
     joint = _JOINT.fullmatch(stem)
     if joint is None or (unit is not None and joint["kind"] == EFFORT):
-        known = _QUANTITIES.get(stem)
-        contradicted = known is not None and unit is not None and known.dimension != _DIMENSIONS[unit]
-        return Column(stem, None, unit, None if contradicted else known)
+        quantity = _QUANTITIES.get(stem)
+        contradicted = quantity is not None and unit is not None and quantity.dimension != _DIMENSIONS[unit]
+        return Column(stem, None, unit, None if contradicted else quantity)
     kind = joint["kind"]
     quantity = Quantity(_DIMENSIONS[unit], JOINT_ORDERS[kind]) if unit else None
     return Column(kind, int(joint["number"]) - 1, unit, quantity)

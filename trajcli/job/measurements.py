@@ -86,8 +86,8 @@ def read_measurements(path: str, robot: Robot, units: Units) -> Measurements:
     flaw = next(_flaws_of_deviations(deviations, targets), None)
     if flaw is not None:
         raise InputError(Problem(flaw[1], flaw[2], places[flaw[0]]))
-    known = None if deviations[0] is None else np.array([[a or 1.0, b or 1.0] for a, b in deviations])
-    return Measurements(np.array(joints), tuple(_kinds(targets)), known)
+    spread = None if deviations[0] is None else np.array([[a or 1.0, b or 1.0] for a, b in deviations])
+    return Measurements(np.array(joints), tuple(_kinds(targets)), spread)
 
 
 def read_configurations(path: str, robot: Robot, units: Units) -> Array:
@@ -246,11 +246,11 @@ def _from_table(table: Table, robot: Robot) -> Measurements:
 
 def _refuse_unknown(table: Table, columns: Mapping[str, Column], robot: Robot) -> None:
     """Refuse a name that is no column of ours: it may be a misspelt one."""
-    known = [*(f"q{i + 1}" for i in range(len(robot.joints))), *_AXES, *_QUATERNION, *_OWN]
+    names = [*(f"q{i + 1}" for i in range(len(robot.joints))), *_AXES, *_QUATERNION, *_OWN]
     for name, column in columns.items():
         ours = group_of(column) in GROUPS or column.kind in (*_OWN, *robot.joint_names)
         if not ours and column.joint is None:
-            hint = did_you_mean(name, known) or f"the columns are {', '.join(known)}, with _deg or _mm"
+            hint = did_you_mean(name, names) or f"the columns are {', '.join(names)}, with _deg or _mm"
             raise InputError(f"{table.file}: there is no column '{name}'", hint=hint)
 
 

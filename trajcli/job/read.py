@@ -43,7 +43,23 @@ _GOALS = ("to", "through", "segments", "line", "arc")
 """Keys under which an entry of the moves says where it ends, the last first."""
 _RECORDED = ("start", "through", "segments")
 """Keys under which a file of places may be named."""
-_STAYS = frozenset(("planner", "duration", "label", "attach", "detach", "tool", "signal", "at", "defaults"))
+_STAYS = frozenset(
+    (
+        "planner",
+        "duration",
+        "label",
+        "limits",
+        "when_over_limit",
+        "zone",
+        "attach",
+        "detach",
+        "tool",
+        "signal",
+        "value",
+        "at",
+        "defaults",
+    )
+)
 """Keys of entries that move nothing."""
 _UNREAD = Robot("unread", (), unlimited(0), None, np.eye(4), np.eye(4))
 """Stands for a robot whose own flaws are known, while the rest of the job is read."""
@@ -420,8 +436,8 @@ def _loosened_by_moves(loaded: LoadedJob) -> Iterator[Problem]:
         for looser in looser_bounds(robot, move.limits) if move.limits is not None else ():
             problem = looser_problem(robot, looser, index)
             path = ("moves", index, "limits", looser.quantity)
-            one = next((p for p in _of_joint(path, looser.joint, robot) if loaded.document.node(p)), path)
-            place = loaded.document.place(one)
+            below = [(*path, key) for key in (robot.joint_names[looser.joint], looser.joint)]
+            place = loaded.document.place(next(filter(loaded.document.node, below), path))
             yield replace(problem, message=problem.text(loaded.say), amounts={}, place=place)
 
 
@@ -441,11 +457,6 @@ def _columns_without_geometry(loaded: LoadedJob) -> Iterator[Problem]:
             message = f"the columns '{group}' need a robot with geometry, {loaded.robot.name} has bare joints"
             hint = "give each joint its DH row (theta, d, a, alpha) and the robot its convention"
             yield Problem(message, hint, loaded.document.place(("output", "columns", index)))
-
-
-def _of_joint(path: tuple[str | int, ...], joint: int, robot: Robot) -> list[tuple[str | int, ...]]:
-    """Return where the value of one joint may stand below `path`."""
-    return [(*path, robot.joint_names[joint]), (*path, joint)]
 
 
 def _position(problem: Problem) -> tuple[str, int, int]:

@@ -85,15 +85,15 @@ def require_possible_solid(
         raise InputError(f"expected a mass {least}, got {mass:g}")
     if not (np.isfinite(com).all() and np.isfinite(inertia).all()):
         raise InputError("expected finite numbers for the centre of mass and the inertia")
-    room = _INERTIA_ROUNDING * float(np.abs(inertia).max())
-    if np.abs(inertia - inertia.T).max() > room:
+    slack = _INERTIA_ROUNDING * float(np.abs(inertia).max())
+    if np.abs(inertia - inertia.T).max() > slack:
         raise InputError("a tensor of inertia is symmetric: its products come in equal pairs")
     moments = np.linalg.eigvalsh(inertia).tolist()
-    room = _INERTIA_ROUNDING * max(map(abs, moments))
+    slack = _INERTIA_ROUNDING * max(map(abs, moments))
     shown = ", ".join(f"{moment:.6g}" for moment in moments)
-    if moments[0] < -room:
+    if moments[0] < -slack:
         raise InputError(f"no solid has a negative moment of inertia: the principal ones are {shown}")
-    if moments[2] > moments[0] + moments[1] + room:
+    if moments[2] > moments[0] + moments[1] + slack:
         raise InputError(
             "no solid has a moment of inertia above the sum of the two others: "
             f"the principal ones are {shown}",

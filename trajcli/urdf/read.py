@@ -118,8 +118,8 @@ class UrdfDocument:
             raise self.refused(f"{attribute}: expected {wanted}, got {got}", element, attribute)
         values = np.array(list(map(float, words)))
         if not (np.abs(values) <= LARGEST_POSITION).all():
-            most = f"expected a magnitude of at most {LARGEST_POSITION:g}"
-            raise self.refused(f'{attribute}: {most}, got "{text[:_QUOTED]}"', element, attribute)
+            wanted = f"expected a magnitude of at most {LARGEST_POSITION:g}"
+            raise self.refused(f'{attribute}: {wanted}, got "{text[:_QUOTED]}"', element, attribute)
         return values
 
     def number(self, element: Element | None, attribute: str) -> float | None:

@@ -162,8 +162,8 @@ class _Tree:
         starts = self.roots() if root is None else [root]
         for whole in (False, True):
             ends = [end for start in starts for end in self._behind(start, whole=whole)]
-            most = max((moving for _, moving, _ in ends), default=0)
-            if most:
+            count = max((moving for _, moving, _ in ends), default=0)
+            if count:
                 break
         else:
             message = "the robot has no joint that moves" + (f" behind link '{root}'" if root else "")
@@ -171,7 +171,7 @@ class _Tree:
                 Problem(message, "trajcli needs 1 to 12 revolute or prismatic joints", _top(self._document))
             )
         # of several arms the one that the file has first; then the best link behind its last joint
-        longest = [(link, fixed) for link, moving, fixed in ends if moving == most]
+        longest = [(link, fixed) for link, moving, fixed in ends if moving == count]
         first = min((link for link, fixed in longest if fixed == 0), key=self._order.__getitem__)
         rigid = {link: fixed for link, moving, fixed in self._behind(first, whole=whole) if moving == 0}
         return min(rigid, key=lambda link: (_tool_rank(link), -rigid[link], self._order[link]))
