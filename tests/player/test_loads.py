@@ -129,3 +129,68 @@ def test_a_payload_shows_efforts_that_nothing_limits() -> None:
     assert all(len(part["bounds"]) == 4 for part in scene["limits"])
     bare = text.replace(f"  - {{attach: {{mass: {CARRIED}, com: [20, 0, 0]}}}}\n", "")
     assert "tau" not in scene_of_plan(plan_job(job_from_text(bare)))["rows"]["quantities"]
+
+
+ALONE = PENDULUM[: PENDULUM.index("moves:")] + "moves:\n  - {planner: trapezoid, to: {joints: [40]}}\n"
+
+
+@pytest.mark.parametrize(("mass", "radius"), [(1e-6, 0.012), (500.0, 0.35)])
+def test_a_load_is_neither_lost_nor_larger_than_an_arm(mass: float, radius: float) -> None:
+    text = PENDULUM.replace(f"mass: {CARRIED},", f"mass: {mass},").replace("effort: [-50, 60], ", "")
+    (load,) = scene_of_plan(plan_job(job_from_text(text.replace(", limits: {effort: 45}", ""))))["loads"]
+    assert (load["mass"], load["radius"]) == (mass, radius)
+
+
+def test_what_is_taken_up_at_the_end_counts_from_the_end_on() -> None:
+    """The last row is before it; nothing carries what is taken up then."""
+    alone, after = (
+        scene_of_plan(plan_job(job_from_text(ALONE + more)))
+        for more in ("", f"  - {{attach: {{mass: {CARRIED}, com: [20, 0, 0]}}}}\n")
+    )
+    assert after["loads"] == []
+    assert unpacked(after, "tau")[1] == pytest.approx(unpacked(alone, "tau")[1], abs=1e-6)
+
+
+def test_each_move_has_the_efforts_of_what_is_carried_in_it() -> None:
+    """The weight of what is carried, at the ends of moves, by the lever; what is between two moves takes no time."""
+    attach = f"  - {{attach: {{mass: {CARRIED}, com: [20, 0, 0]}}}}\n"
+    moves = [f"  - {{planner: trapezoid, to: {{joints: [{angle}]}}}}\n" for angle in (40, 60, 80, 30)]
+    text = ALONE.replace(
+        moves[0], "".join([attach, moves[0], "  - {detach: {}}\n", *moves[1:3], attach, moves[3]])
+    )
+    plan = plan_job(job_from_text(text))
+    times, tau = unpacked(scene_of_plan(plan), "tau")
+    for span in (span for span in plan.trajectory.spans if not span.handles):
+        inside = np.flatnonzero((times > span.start) & (times < span.end))
+        for side, row in (("right", inside[0]), ("left", inside[-1])):
+            q, qd, qdd = (
+                float(plan.trajectory.curve.evaluate(times[row], k, side=side)[0]) for k in range(3)
+            )
+            carried = CARRIED if span.index in (1, 6) else 0.0
+            inertia = INERTIA + MASS * LENGTH**2 + carried * (LENGTH + 0.02) ** 2
+            held = (MASS * LENGTH + carried * (LENGTH + 0.02)) * G * np.cos(q)
+            assert tau[row, 0] == pytest.approx(inertia * qdd + held + COULOMB * np.sign(qd), abs=1e-4)
+
+
+def test_efforts_are_shown_where_they_are_limited_and_inertias_are_known() -> None:
+    assert "tau" in scene_of_plan(plan_job(job_from_text(ALONE)))["rows"]["quantities"]
+    start, end = PENDULUM.index("\n       link:"), PENDULUM.index("gravity:")
+    massless = (PENDULUM[:start] + "}\n" + PENDULUM[end:]).replace("effort: [-50, 60], ", "")
+    scene = scene_of_plan(plan_job(job_from_text(massless.replace(", limits: {effort: 45}", ""))))
+    assert len(scene["loads"]) == 1
+    assert "tau" not in scene["rows"]["quantities"]
+
+
+def test_nothing_of_no_mass_is_a_load() -> None:
+    assert (
+        scene_of_plan(plan_job(job_from_text(PENDULUM.replace(f"mass: {CARRIED},", "mass: 0,"))))["loads"]
+        == []
+    )
+
+
+def test_a_load_keeps_its_place_on_the_flange_where_the_tool_is_changed() -> None:
+    moves = "  - {tool: light}\n  - {planner: trapezoid, to: {joints: [10]}}\n"
+    text = PENDULUM.replace("gravity:", "tools: {light: {xyz: [5, 0, 0]}}\ngravity:") + moves
+    first, second = scene_of_plan(plan_job(job_from_text(text)))["loads"]
+    assert (first["com"][0], second["com"][0]) == pytest.approx((0.02, 0.015))
+    assert first["end"] == second["start"]

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from planned_examples import flown_cell, planned_example
 
+from tests.player.test_loads import PENDULUM
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.forward import forward
 from trajcli.planning.plan import plan_job
+from trajcli.player.marks import zones_of
 from trajcli.player.scene import scene_of_plan
 
 
@@ -97,3 +100,58 @@ def test_attach_and_detach_are_marks_and_no_moves() -> None:
     assert [(mark["index"], mark["label"]) for mark in scene["marks"]] == [(1, "attach: 5 kg"), (3, "detach")]
     assert [mark["time"] for mark in scene["marks"]] == [plan.trajectory.spans[i].start for i in (1, 3)]
     assert [move["index"] for move in scene["moves"]] == [0, 2, 4]
+
+
+def test_what_is_taken_up_says_its_mass_and_a_tool_does_not() -> None:
+    text = PENDULUM.replace("gravity:", "tools: {gun: {xyz: [0, 0, 0], mass: 2}}\ngravity:").replace(
+        "mass: 1.2,", "mass: 1.2345,"
+    )
+    more = "  - {tool: gun}\n  - {signal: glue, value: 0.25}\n  - {signal: lamp, value: 1}\n"
+    more += "  - {planner: trapezoid, to: {joints: [-20]}}\n  - {planner: trapezoid, to: {joints: [0]}}\n"
+    scene = scene_of_plan(plan_job(job_from_text(text + more)))
+    labels = {mark["index"]: mark["label"] for mark in scene["marks"]}
+    assert labels == {1: "attach: 1.234 kg", 3: "gun (tool)", 4: "signal: glue = 0.25", 5: "signal: lamp = 1"}
+    assert [change["label"] for signal in scene["signals"] for change in signal["changes"]] == [
+        "move 4 (signal)",
+        "move 5 (signal)",
+    ]
+
+
+def test_words_of_a_zone(cell: dict[str, Any]) -> None:
+    """By quantity: its size in the job's units, how near the tool comes, and what binds."""
+    plan = flown_cell()
+    assert plan.flyby is not None
+    assert [zone["label"] for zone in cell["zones"]] == [
+        f"zone {k + 1}, {plan.loaded.called(zone.move)}:" for k, zone in enumerate(plan.flyby.zones)
+    ]
+    first, second = plan.flyby.zones
+    fields = {"used": 0.1, "asked": 0.2, "binds": "velocity of some joint"}
+    zones = (
+        replace(first, of="position", nearest=0.012345, **fields),
+        replace(second, of="orientation", nearest=None, **fields),
+        replace(second, of="joints", joint=2, nearest=None, **fields),
+    )
+    shown = zones_of(replace(plan, flyby=replace(plan.flyby, zones=zones)))
+    near, ending = "the tool comes to 12.3 mm from the corner; ", "binding: velocity of some joint"
+    assert [each["message"] for each in shown] == [
+        f"100 mm of 200 mm (position); {near}{ending}",
+        f"5.73 deg of 11.46 deg (orientation); {ending}",
+        f"5.73 deg of 11.46 deg (elbow_joint); {ending}",
+    ]
+    assert [each["ball"] is None for each in shown] == [False, True, True]
+    many = zones_of(replace(plan, flyby=replace(plan.flyby, zones=zones * 150)))
+    assert len(many) == 400  # a page of more would be large
+
+
+def test_a_zone_is_drawn_by_the_tool_of_its_own_move() -> None:
+    plan = flown_cell()
+    assert plan.flyby is not None
+    zone = plan.flyby.zones[1]
+    longer = plan.loaded.robot.tool @ np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.5], [0, 0, 0, 1]])
+    moves = [
+        replace(move, robot=replace(move.robot, tool=longer)) if k == zone.move else move
+        for k, move in enumerate(plan.moves)
+    ]
+    drawn = zones_of(replace(plan, moves=tuple(moves)))[1]
+    places = forward(replace(plan.loaded.robot, tool=longer), zone.programmed)[:, :3, 3]
+    assert np.array(drawn["programmed"]) == pytest.approx(places, abs=1e-6)

@@ -30,14 +30,14 @@ def marks_of(plan: Plan) -> list[dict[str, Any]]:
 
 
 def _called(span: Span, plan: Plan) -> str:
-    set_by_it = [
+    load = getattr(plan.loaded.job.moves[span.index], "attach", None)
+    what = f"{load.mass:.4g} kg" if load else ""
+    what += ", ".join(
         f"{signal.name} = {change.value:g}"
         for signal in plan.trajectory.signals
         for change in signal.changes
         if change.move == span.index
-    ]
-    mass = 0.0 if span.payload is None else span.payload.mass
-    what = ", ".join(set_by_it) or (f"{mass:.4g} kg" if mass > 0 else "")
+    )
     return f"{span.title}: {what}" if what else span.title
 
 
@@ -62,7 +62,7 @@ def _zone(plan: Plan, zone: FlownZone) -> dict[str, Any]:
 
 
 def _rounded(values: Array) -> list[Any]:
-    """Return positions to a tenth of a micrometre."""
+    """Return positions to 1e-7 m."""
     rounded: list[Any] = np.round(values, 7).tolist()
     return rounded
 
@@ -137,10 +137,10 @@ def efforts_of_rows(plan: Plan, rows: DrawnRows) -> Array:
 
     q, qd, qdd = (rows.values[name] for name in ("q", "qd", "qdd"))
     efforts = np.zeros_like(q)
-    known = np.isfinite(np.concatenate([q, qd, qdd], axis=1)).all(axis=1)
+    finite = np.isfinite(np.concatenate([q, qd, qdd], axis=1)).all(axis=1)
     owners = _owners(plan, rows.times)
     for index, move in enumerate(plan.moves):
-        own = known & (owners == index)
+        own = finite & (owners == index)
         if own.any():
             efforts[own] = InverseDynamics(move.robot).effort(q[own], qd[own], qdd[own])
     return efforts
