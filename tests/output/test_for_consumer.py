@@ -343,5 +343,6 @@ def test_a_motion_through_zones_is_no_slower_for_a_consumer_than_one_that_stops(
     kinds = {event.kind for event in made.plan.events}
     assert ("not_faster" in kinds) == (not made.plan.flyby.zones)
     assert made.plan.loaded.job.zone is not None
+    assert grid_of(made.plan).count == made.grid.count
     alone = [plan_job(job_from_text(json.dumps(CORNER | {"zone": {"joints": zone}}))) for zone in (0.05, 0.0)]
     assert alone[0].trajectory.duration < 0.99 * alone[1].trajectory.duration, "between its rows it is faster"

@@ -15,7 +15,7 @@ from trajcli.errors import VerificationError
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.output.consumer import job_for
 from trajcli.output.delivery.delivered import delivered
-from trajcli.output.delivery.for_consumer import ForConsumer, Writing, plan_for, refusal
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, _Search, plan_for, refusal
 from trajcli.output.write import grid_of
 from trajcli.planning.plan import plan_job
 
@@ -115,6 +115,13 @@ def test_what_a_consumer_brings_is_said_of_rows_that_are_slowed_too() -> None:
     made = made_for(read(job, rate=125), "ur-servoj")
     assert made.duration > made.shortest
     assert made.said[0].startswith("ur-servoj takes rows at 500 Hz")
+    assert "qdd" in made.plan.loaded.job.output.columns, "without it nobody keeps the jerk between rows"
+    with pytest.raises(VerificationError) as refused:
+        made_for(read({**job, "when_over_limit": "error"}, rate=125), "ur-servoj")
+    advice = refused.value.problems[0].hint or ""
+    assert re.fullmatch(r"`--set when_over_limit=slow` keeps all limits, with [\d.]+ s", advice), (
+        "rows at another rate are not what it takes"
+    )
 
 
 @pytest.mark.parametrize(("rate", "digits", "chosen"), [(200, "fixed", False), (400, "full", True)])
@@ -148,3 +155,25 @@ def test_a_rule_that_no_slowness_keeps_is_refused_where_it_is_broken(when: str, 
         assert problem.time == pytest.approx(end, abs=1e-9)
         assert problem.place == loaded.place_of_move(1)
     assert delivery.value.problems[0].hint == "end at rest, with a last velocity of exactly 0.0"
+
+
+@pytest.mark.parametrize("begins", [7.0, -3.0])
+def test_a_rule_that_slowness_keeps_is_refused_in_the_move_that_breaks_it(begins: float) -> None:
+    """The FR3 takes 2.62 rad/s less a thousandth; a quintic of 2.2 rad reaches 15 / 8 of its mean speed, in the middle."""
+    speed = 2.6195
+    turns = [(-1.0, 2.0), (1.2, 15 / 8 * 2.2 / speed), (0.8, 2.0)]
+    moves = [
+        {"planner": "quintic", "to": {"joints": [to, -0.3, 0, -2, 0, 1.8, 0.5]}, "duration": duration}
+        for to, duration in turns
+    ]
+    arm = {"robot": "fr3", "start": {"joints": [-1.2, -0.3, 0, -2, 0, 1.8, 0.5]}, "moves": moves}
+    limits = {"velocity": 2.62, "acceleration": 10, "jerk": 4900}
+    loaded = read({**arm, "limits": limits}, start_time=begins)
+    for_fr3, profile, _ = job_for(loaded, "franka-fr3", {})
+    made = _Search(for_fr3, profile, Writing(), None).first()
+    assert [(found.rule, found.move) for found in made.over] == [("fr3-velocity", 1)]
+    (problem,) = refusal(made, ()).problems
+    assert (problem.kind, problem.move, problem.joint) == ("fr3-velocity", 1, "fr3_joint1")
+    assert problem.place == loaded.place_of_move(1)
+    assert problem.value == pytest.approx(speed, rel=1e-3)
+    assert problem.time == pytest.approx(2.0 + turns[1][1] / 2, abs=0.02)

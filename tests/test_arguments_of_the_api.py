@@ -1,0 +1,179 @@
+"""Arguments of the API for Python, each by what it changes: in numbers, in files, in what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import trajcli
+from tests.cli.running import call
+
+SLIDE: dict[str, Any] = {
+    "version": 1,
+    "units": {"angle": "deg", "length": "mm"},
+    "robot": {"joints": [{"name": "turn"}, {"name": "slide", "type": "prismatic"}]},
+    "limits": {"velocity": 100},
+    "start": {"joints": [0, 0]},
+    "moves": [
+        {"planner": "quintic", "to": {"joints": [40, 10]}, "duration": 2},
+        {"planner": "quintic", "to": {"joints": [0, 30]}, "duration": 1},
+    ],
+}
+
+
+def job_file(folder: Path, job: dict[str, Any] = SLIDE, name: str = "job", **changes: Any) -> Path:
+    path = folder / f"{name}.yaml"
+    path.write_text(json.dumps({**job, **changes}))
+    return path
+
+
+@pytest.mark.parametrize("per_move", [False, True])
+@pytest.mark.parametrize("fastest", [False, True])
+def test_a_motion_is_retimed_as_a_whole_or_move_by_move(
+    tmp_path: Path, per_move: bool, fastest: bool
+) -> None:
+    """Quintics at 15/8 of their mean speed, 37.5 and 75 deg/s of 25: as a whole both are stretched by the worse one."""
+    output = {"columns": ["t", "q", "qd", "qdd", "move"], "rate": 100}
+    fast = job_file(tmp_path, output=output)
+    trajcli.plan(fast).save(tmp_path / "rows.csv")
+    limited = job_file(tmp_path, name="limited", limits={"velocity": 60})
+    motion = trajcli.retime(tmp_path / "rows.csv", job=limited, per_move=per_move, fastest=fastest)
+    first = (37.5 / 60 if fastest else 1.0) if per_move else 75 / 60
+    assert motion.duration == pytest.approx(2 * first + 75 / 60, rel=1e-6)
+    assert len(motion.stretches) == (2 if per_move else 1)
+    assert motion.qd is not None
+    assert np.degrees(np.abs(motion.qd[:, 0]).max()) == pytest.approx(60, rel=1e-4)
+
+
+def test_numbers_of_a_file_without_units_are_in_those_of_the_job_by_the_kind_of_joint(tmp_path: Path) -> None:
+    """Degrees of the joint that turns, millimetres of the one that slides; a motion may begin at any time."""
+    rows = tmp_path / "rows.csv"
+    rows.write_text("time,turn_pos,slide_pos\n3.0,0.0,0.0\n3.5,10.0,5.0\n4.5,20.0,30.0\n")
+    motion = trajcli.retime(rows, job=job_file(tmp_path))
+    assert motion.q.tolist() == [
+        [0, 0],
+        pytest.approx([np.radians(10), 5e-3]),
+        pytest.approx([np.radians(20), 0.03]),
+    ]
+    assert motion.duration == pytest.approx(1.5)
+    assert "(3 rows, 2 joints, 1.5 s)" in repr(motion)
+
+
+def test_what_is_written_is_what_is_judged(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The motion of the file that is written is read back: its decimals are those that keep the limits."""
+    trajcli.plan(job_file(tmp_path, output={"rate": 50})).save(tmp_path / "rows.csv")
+    limited = job_file(tmp_path, name="limited", limits={"velocity": 41.7})
+    written = trajcli.retime(tmp_path / "rows.csv", job=limited, output=tmp_path / "after.csv")
+    code, out, err = call(capfd, "check", tmp_path / "after.csv", "--job", limited)
+    assert code == 0, out + err
+    again = trajcli.resample(tmp_path / "after.csv", 100)
+    assert again.duration == pytest.approx(written.duration, abs=1e-8)
+    assert not (tmp_path / "again.csv").exists()
+    trajcli.resample(tmp_path / "after.csv", 100, output=tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").exists()
+
+
+STEP: dict[str, Any] = {
+    "version": 1,
+    "robot": {"joints": 1},
+    "limits": {"velocity": 2, "acceleration": 8, "jerk": 40},
+    "start": {"joints": [0]},
+    "moves": [{"planner": "jerk_limited", "to": {"joints": [1]}}],
+    "output": {"rate": 7},
+}
+
+
+def test_a_batch_is_strict_for_a_consumer_and_has_its_rows_where_it_is_asked_to(tmp_path: Path) -> None:
+    """Quintics between seven rows per second pass the jerk; between knots they are the motion itself."""
+    jobs = [job_file(tmp_path, STEP)]
+
+    def outcome(name: str, **options: Any) -> tuple[str, int]:
+        (one,) = trajcli.batch(jobs, tmp_path / name, processes=1, **options)
+        rows = tmp_path / name / "job.csv"
+        return one.outcome, rows.read_text().count("\n") - 1 if rows.exists() else 0
+
+    assert outcome("plain") == ("written", 8)
+    assert outcome("plain") == ("unchanged", 8)
+    assert outcome("plain", force=True) == ("written", 8)
+    assert outcome("strict", strict=True) == ("failed", 0)
+    assert outcome("ros", consumer="ros-jtc") == ("failed", 0)
+    switches = trajcli.plan(jobs[0]).trajectory.curve.pieces + 1
+    kind, count = outcome("knots", rows="knots", strict=True)
+    assert kind == "written"
+    assert count >= switches
+    kind, count = outcome("knots for ros", rows="knots", consumer="ros-jtc", strict=True)
+    assert (kind, count >= switches) == ("written", True)
+
+
+def test_rows_of_a_job_that_fails_now_are_set_aside(tmp_path: Path) -> None:
+    job = job_file(tmp_path, STEP)
+    trajcli.batch(job, processes=1)
+    job_file(tmp_path, STEP, limits={"velocity": 2, "acceleration": 8, "jerk": -1})
+    (failed,) = trajcli.batch(job, processes=1)
+    assert failed.outcome == "failed"
+    assert not (tmp_path / "job.csv").exists()
+    assert (tmp_path / "job.csv.stale").exists()
+
+
+def test_a_sweep_draws_by_its_seed_and_keeps_its_table(tmp_path: Path) -> None:
+    job, table = job_file(tmp_path, STEP), tmp_path / "table.csv"
+    vary = {"limits.velocity": "0.5..2:30", "limits.jerk": [20, 40]}
+    drawn = [trajcli.sweep(job, vary, processes=1, samples=3, seed=seed) for seed in (1, 2, 1)]
+    values = [[row.values for row in each.rows] for each in drawn]
+    assert [len(each) for each in values] == [3, 3, 3]
+    assert values[0] == values[2] != values[1]
+    for row in drawn[0].rows:
+        limits = {**STEP["limits"], "velocity": float(row.values[0]), "jerk": float(row.values[1])}
+        plan = trajcli.plan({**STEP, "limits": limits})
+        assert row.point.duration == pytest.approx(plan.trajectory.duration, rel=1e-9)
+    trajcli.sweep(job, {"limits.jerk": [40, 20]}, table, processes=1)
+    assert table.read_text().count("\n") == 3
+
+
+def test_an_arm_names_its_frames_and_its_solutions_beyond_limits() -> None:
+    robot = trajcli.load_robot("irb4600")
+    q = np.array([0.3, 0.2, 0.1, 0.4, 0.5, 0.6])
+    pose, turn = robot.fk(q), robot.fk(q)[:3, :3]
+    world, tcp = robot.jacobian(q), robot.jacobian(q, "tcp")
+    np.testing.assert_allclose(tcp[:3], turn.T @ world[:3], atol=1e-12)
+    np.testing.assert_allclose(tcp[3:], turn.T @ world[3:], atol=1e-12)
+    low, high = robot.limits.position.T
+    every, inside = robot.ik(pose, near=q, every=True), robot.ik(pose, near=q)
+    assert 0 < len(inside) < len(every)
+    for found in every:
+        kept = bool(((found.joints >= low - 1e-9) & (found.joints <= high + 1e-9)).all())
+        assert found.within_limits == kept
+        assert ("outside limits" in repr(found)) == (not kept)
+        missed = robot.fk(found.joints) - pose
+        assert np.abs(missed[:3, 3]).max() <= found.closure + 1e-12
+    distances = [np.abs(found.joints - q).max() for found in every]
+    assert distances == sorted(distances)
+    assert not every[0].singular
+    straight = robot.fk(
+        [0.3, 0.2, 0.1, 0.4, 0.0, 0.6]
+    )  # the wrist stretched: its first and last axis are one
+    assert any(found.singular for found in robot.ik(straight))
+
+
+def test_rows_and_consumer_of_a_plan_go_before_its_job(tmp_path: Path) -> None:
+    job = job_file(tmp_path, STEP)
+    assert trajcli.plan(job, rows="knots").loaded.job.output.rows == "knots"
+    assert trajcli.plan(job, rows="knots", consumer="ros-jtc").loaded.job.output.rows == "knots"
+    with pytest.raises(trajcli.VerificationError, match="ros-jtc at 7 Hz"):
+        trajcli.plan(job, rows="rate", consumer="ros-jtc")
+
+
+def test_a_motion_of_arrays_is_judged_by_all_that_is_given() -> None:
+    """A quintic of 1 rad in 1 s between two rows: 1.875 rad/s; as a cubic 1.5, along a line 1."""
+    ends: Any = ([0.0, 1.0], [[0.0], [1.0]])
+    still = {"qd": [[0.0], [0.0]], "qdd": [[0.0], [0.0]]}
+    for limit, given in ((1.876, still), (1.501, {"qd": still["qd"]})):
+        assert trajcli.check(*ends, limits={"velocity": limit}, **given).findings == ()
+        (found,) = trajcli.check(*ends, limits={"velocity": limit - 0.002}, **given).findings
+        assert found.value == pytest.approx(limit - 0.001)
+    asked = trajcli.check(*ends, limits={"velocity": 1.7}, interpolate="cubic", **still)
+    assert asked.findings == ()
