@@ -167,6 +167,21 @@ def test_rows_and_consumer_of_a_plan_go_before_its_job(tmp_path: Path) -> None:
         trajcli.plan(job, rows="rate", consumer="ros-jtc")
 
 
+def test_a_plan_for_a_consumer_is_saved_with_the_digits_that_it_needs(tmp_path: Path) -> None:
+    """Of 20 rad/s^3 a rounding of 1e-9 rad makes 60 at 1 kHz: rows of a plan for nobody have nine decimals all the same."""
+    limits = {"velocity": 0.1, "acceleration": 1, "jerk": 20}
+    moves = [{"planner": "quintic", "to": {"joints": [0.1]}, "duration": 3}]
+    job = job_file(tmp_path, {**STEP, "limits": limits, "moves": moves}, output={"rate": 1000})
+    longest = {}
+    for consumer in (None, "ros-jtc"):
+        for digits in (None, "fixed", "full"):
+            trajcli.plan(job, consumer=consumer).save(tmp_path / "rows.csv", digits=digits)  # type: ignore[arg-type]
+            cells = (tmp_path / "rows.csv").read_text().split("\n", 1)[1].replace("\n", ",").split(",")
+            longest[consumer, digits] = max(len(cell.partition(".")[2]) for cell in cells)
+    assert longest[None, None] == longest[None, "fixed"] == longest["ros-jtc", "fixed"] == 9
+    assert longest["ros-jtc", None] == longest["ros-jtc", "full"] > 12
+
+
 def test_a_motion_of_arrays_is_judged_by_all_that_is_given() -> None:
     """A quintic of 1 rad in 1 s between two rows: 1.875 rad/s; as a cubic 1.5, along a line 1."""
     ends: Any = ([0.0, 1.0], [[0.0], [1.0]])

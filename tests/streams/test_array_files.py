@@ -22,7 +22,7 @@ from trajcli.units import Units
 
 COLUMNS = columns_of(("t", "q", "qd", "pose", "move"), ("revolute", "prismatic"), Units())
 ROWS = np.random.default_rng(1).normal(size=(23, len(COLUMNS)))
-ROWS[:, 0] = np.arange(23) / 10
+ROWS[:, 0], ROWS[:, -1] = np.arange(23) / 10, np.arange(23) // 10
 BLOCKS = (ROWS[:10], ROWS[10:])
 GROUPS = {"t": ROWS[:, 0], "q": ROWS[:, 1:3], "qd": ROWS[:, 3:5], "pose": ROWS[:, 5:12], "move": ROWS[:, 12]}
 ROBOT = "{joints: [{name: a, velocity: 2}, {name: b, velocity: 2}]}"

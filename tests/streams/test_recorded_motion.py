@@ -283,6 +283,8 @@ def test_separators_and_forms_of_numbers(separator, form, tmp_path, monkeypatch)
         ("t;q1\n0;1\n1;nan\n", "in.csv:3:3", "q1 is 'nan'"),
         ("t,q1,note\n0,1,a\n1,x,b\n", "in.csv:3:3", "q1 is 'x'"),
         ("t,q1\n0,1\n1,-1e308\n", "in.csv:1:3", "q1 is -1e+308 in row 2"),
+        ("t,q1,move\n0,1,0\n1,2,0.5\n2,3,1\n", "in.csv:1:6", "move is 0.5 in row 2"),
+        ("t,q1,move\n0,1,0\n1,2,-1.25\n", "in.csv:1:6", "move is -1.25 in row 2"),
         ("t,q1\n", "in.csv:1:1", "no rows"),
         ("", "", "is empty"),
         ("Dear reader, this is no table.\n" * 30, "in.csv:1:1", "no columns are positions"),

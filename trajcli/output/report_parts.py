@@ -23,7 +23,6 @@ from trajcli.planning.plan import Plan
 from trajcli.units import effort_unit, joint_units
 
 if TYPE_CHECKING:
-    from trajcli.dynamics.effort_bound import EffortPeak
     from trajcli.limits.effort import MoveEfforts
     from trajcli.planning.flown_job import FlownZone, FlyBy
     from trajcli.planning.sensitivity import Saving
@@ -81,13 +80,9 @@ def _report(robot: Robot, joint: int, efforts: MoveEfforts, start: float) -> Eff
         used=max(used, 0.0) if math.isfinite(min(-lower, upper)) else None,
         head_room=limit - worst.upper_bound if math.isfinite(limit) else None,
         gravity=sign * worst.gravity,
-        gravity_share=_share(worst),
+        gravity_share=worst.gravity / worst.value if worst.value else 0.0,
         unit=kind,
     )
-
-
-def _share(peak: EffortPeak) -> float:
-    return peak.gravity / peak.value if peak.value else 0.0
 
 
 def _finite(bound: float) -> float | None:
@@ -143,9 +138,7 @@ def flyby_report(flyby: FlyBy, types: Sequence[JointType], names: Sequence[str])
 
 
 def _zone(zone: FlownZone, types: Sequence[JointType], names: Sequence[str]) -> ZoneReport:
-    unit = {"position": "m", "orientation": "rad"}.get(zone.of)
-    if unit is None:
-        unit = joint_units(types)[zone.joint or 0]
+    unit = {"position": "m", "orientation": "rad"}.get(zone.of) or joint_units(types)[zone.joint or 0]
     return ZoneReport.model_validate(
         {
             **{key: getattr(zone, key) for key in ZoneReport.model_fields if hasattr(zone, key)},

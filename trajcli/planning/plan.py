@@ -468,8 +468,10 @@ def _errors_at(loaded: LoadedJob, place: Place) -> Iterator[None]:
         hint = _unit_hint(loaded) if isinstance(error, PlanningError) else None
         if hint is None:
             raise said from None
-        hints = (f"{hint}; else {problem.hint}" if problem.hint else hint for problem in said.problems)
-        problems = (replace(p, hint=text) for p, text in zip(said.problems, hints, strict=True))
+        problems = (
+            replace(problem, hint=f"{hint}; else {problem.hint}" if problem.hint else hint)
+            for problem in said.problems
+        )
         raise type(error)(*problems) from None
 
 

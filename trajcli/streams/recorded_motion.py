@@ -176,8 +176,11 @@ class MotionFile:
             if scales.open:
                 self._refuse_open(scales.open, block)
             everywhere.add(block)
-            if (everywhere.largest > self._bounds).any():
-                self._refuse_far(block)
+            wrong = np.abs(block) > self._bounds
+            if self._move is not None:
+                wrong[:, self._move] |= block[:, self._move] % 1 > 0
+            if wrong.any():
+                self._refuse(block, *np.argwhere(wrong)[0].tolist())
             fit.add(block[:, self._time] / self._per_second)
             self.rows += len(block)
             kept += block.size
@@ -188,12 +191,14 @@ class MotionFile:
         self.resolution = self._resolution(everywhere)
         self.period = fit.result(self.resolution.time, self.resolution.relative_time)
 
-    def _refuse_far(self, block: Array) -> NoReturn:
-        """Refuse a number that no motion has, and that overflows wherever it is used."""
-        row, column = np.argwhere(np.abs(block) > self._bounds)[0].tolist()
+    def _refuse(self, block: Array, row: int, column: int) -> NoReturn:
+        """Refuse a number that no motion has: one that overflows wherever it is used, or a part of a move."""
         name = self._rows.named.names[self._taken[column]]
         message = f"{name} is {block[row, column]:.6g} in row {self.rows + row + 1}"
-        raise self._rows.named.wrong(message, "check its exponent", name)
+        hint = (
+            "moves are counted: say `--columns move=none`" if column == self._move else "check its exponent"
+        )
+        raise self._rows.named.wrong(message, hint, name)
 
     def _refuse_open(self, columns: Sequence[int], block: Array) -> NoReturn:
         """Refuse columns whose unit nothing says; the first rows give a hint."""
@@ -360,10 +365,14 @@ def motion_of(
     roles = assign_roles(rows.named, columns, None if numbered else joints)
     names = rows.joint_names or roles.joint_names
     order, ordered, notes = ordered_joints(rows.named, roles, names, joints)
-    plain = Units() if rows.si or own else None
-    types = None if joint_types is None else _by_file(joint_types, order, len(roles.joints["q"]))
-    other = None if rows.si else declared  # messages are in SI, whatever a job says
-    scales = scales_of(rows.named, roles, said, plain=plain, joint_types=types, declared=other)
+    scales = scales_of(
+        rows.named,
+        roles,
+        said,
+        plain=Units() if rows.si or own else None,
+        joint_types=None if joint_types is None else _by_file(joint_types, order, len(roles.joints["q"])),
+        declared=None if rows.si else declared,  # messages are in SI, whatever a job says
+    )
     found = MotionFile(rows, roles, scales, order, ordered)
     found.notes += notes
     return found
