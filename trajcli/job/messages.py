@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, TypeVar, get_origin
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from trajcli.errors import InputError, Problem
+from trajcli.geometry.rotation import check_rotation
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document
 from trajcli.language.limits import LimitsSpec
-from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, ReadingContext, shown
+from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, FlawError, ReadingContext, shown
+from trajcli.language.poses import read_rows
 from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS, defaults_of_paths
+from trajcli.planners.planner import Event
 from trajcli.suggest import abridged, did_you_mean, valid_names
 
 M = TypeVar("M", bound=BaseModel)
+_NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
 _KINDS = {
     "bool_parsing": "true or false",
     "bool_type": "true or false",
@@ -371,3 +377,38 @@ def no_robot(value: object, document: Document) -> Problem:
         hint = f"for {value} bare joints write {{joints: {value}}}"
     message = f"expected a robot's name, {{file: PATH}}, {{urdf: PATH}} or a robot, got {shown(value)}"
     return Problem(message, hint, document.place(("robot",)))
+
+
+def matrices_off_rotation(document: Document) -> Iterator[Event]:
+    """Yield the event of each matrix that is not quite a rotation, so that the nearest one is taken.
+
+    Args:
+        document: Of a job or of a robot, without flaws.
+    """
+    seen: set[int] = set()  # a move that is repeated has one matrix
+    for path, node in _matrices(document.root):
+        if id(node.value) in seen:
+            continue
+        seen.add(id(node.value))
+        with suppress(FlawError):  # a list of names that is called so
+            rows = read_rows(node.plain(), ReadingContext())
+            defect = check_rotation(np.array([row[:3] for row in rows[:3]]))
+            if defect > _NOTED:
+                move = path[1] if path[0] == "moves" and isinstance(path[1], int) else None
+                where = ".".join(map(str, path if move is None else path[2:]))
+                text = f"the matrix {where} is off a rotation by {defect:.3g}: the nearest one is taken"
+                yield Event("nearest_rotation", text, move)
+
+
+def _matrices(node: Node, *path: str | int) -> Iterator[tuple[FieldPath, Node]]:
+    """Yield the lists under a key `matrix`, and where each is."""
+    value = node.value
+    if isinstance(value, dict):
+        for key, below in value.items():
+            if key == "matrix" and isinstance(below.value, list):
+                yield (*path, key), below
+            else:
+                yield from _matrices(below, *path, key)
+    elif isinstance(value, list):
+        for index, below in enumerate(value):
+            yield from _matrices(below, *path, index)

@@ -304,15 +304,23 @@ def _load(document: Document) -> LoadedJob:
     except InputError as error:
         raise error.said_by(str).located(place=document.place(("limits", "position"))) from None
     name = job.name or ("stdin" if document.file in ("-", "<stdin>") else utf8(Path(document.file).stem))
-    if sheet is not None:
-        events = [*(Event(kind, message) for kind, message in sheet.concessions), *events]
     source = "the job" if sheet is None else sheet.source or _named_source(plain["robot"])
-    events = [*noted, *events, *_own_tool_replaced(job, robot, plain["robot"])]
+    said = () if sheet is None else _said_in_reading(sheet, context, document)
+    events = [*noted, *said, *events, *_own_tool_replaced(job, robot, plain["robot"])]
     loaded = LoadedJob(
         job, name, effective, document, tuple(events), source, context.has_far_angle, context.waits
     )
     _require_no_flaws(loaded)
     return loaded
+
+
+def _said_in_reading(sheet: RobotSheet, context: ReadingContext, document: Document) -> Iterator[Event]:
+    """Yield what was taken for granted in reading a job and its robot."""
+    if context.has_matrix or "matrix" in str(_plain(document.node(("robot",)))):
+        from trajcli.job.messages import matrices_off_rotation
+
+        yield from matrices_off_rotation(document)
+    yield from (Event(kind, message) for kind, message in sheet.concessions)
 
 
 def _own_tool_replaced(job: Job, robot: Robot, named: object) -> list[Event]:

@@ -404,16 +404,20 @@ def _sheet_of(content: bytes, path: str, *, own_efforts: bool) -> RobotSheet:
     document = parse_document(content, path)
     plain = document.plain()
     spec = plain.get("units") if isinstance(plain.get("units"), Mapping) else {}
-    units = Units(
-        "deg" if spec.get("angle") == "deg" else "rad",
-        "mm" if spec.get("length") == "mm" else "m",
-    )
+    angle, length = spec.get("angle"), spec.get("length")
+    units = Units("deg" if angle == "deg" else "rad", "mm" if length == "mm" else "m")
     model = _validated({"name": utf8(Path(path).stem), **plain}, document, (), units, RobotModel)
-    text = "\n".join(document.lines)
+    text, conceded = "\n".join(document.lines), tuple[tuple[str, str], ...]()
+    if "matrix" in text:
+        from trajcli.job.messages import matrices_off_rotation
+
+        conceded = tuple(
+            (event.kind, f"{path}: {event.message}") for event in matrices_off_rotation(document)
+        )
     said = (model.source, model.licence, model.note, text, model.maker, model.origin, model.date)
     # numbers that nobody has looked at count where a job asks for them
     own_efforts = own_efforts and not is_urdf(model.source or "")
-    return RobotSheet(model.as_robot(efforts=own_efforts), units, *said)
+    return RobotSheet(model.as_robot(efforts=own_efforts), units, *said, conceded)
 
 
 def _from_urdf_entry(value: Mapping[str, Any], document: Document) -> RobotSheet:

@@ -110,7 +110,7 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
             fields.pop(key, None)
         fields |= _turned(pose, frame[:3, :3], str(value["in"]))
     elif pose.matrix is not None:
-        fields["matrix"] = pose.given_rotation.tolist()
+        fields["matrix"] = pose.full_pose()[:3, :3].tolist()
     if pose.gives_position:
         position = frame[:3, :3] @ pose.full_pose()[:3, 3] + frame[:3, 3]
         fields["xyz"] = [written_number(x, Quantity("length")) for x in position.tolist()]
@@ -120,7 +120,7 @@ def in_world(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any
 def _turned(pose: PoseFields, axes: Array, name: str) -> dict[str, Any]:
     """Return the orientation of a pose, or the part of one, turned by the axes (3, 3) of a frame."""
     if pose.rotation_form is not None:
-        return {"matrix": (axes @ pose.given_rotation).tolist()}
+        return {"matrix": (axes @ pose.full_pose()[:3, :3]).tolist()}
     if pose.direction is not None:
         return {"direction": (axes @ np.array(pose.direction)).tolist()}
     if pose.yaw is None and pose.pitch is None:

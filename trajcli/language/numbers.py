@@ -79,6 +79,7 @@ class ReadingContext:
         base: Where the arm stands, T_world_base, (4, 4), m.
         waits: Whether a target is given relative to what only the plan knows.
         has_far_angle: Whether a pose has a plain angle of more than two turns, which is a slip of the unit.
+        has_matrix: Whether a rotation is given by its matrix.
         read_points: Reads a file of recorded joint values, its path relative to the job; raises FlawError.
         read_poses: Likewise one of poses of the tool.
     """
@@ -95,6 +96,7 @@ class ReadingContext:
     base: np.ndarray = field(default_factory=lambda: np.eye(4))
     waits: bool = False
     has_far_angle: bool = False
+    has_matrix: bool = False
     read_points: Callable[[str], Recorded] | None = None
     read_poses: Callable[[str], RecordedPoses] | None = None
 

@@ -362,7 +362,7 @@ def _displaced(name: str, pose: PoseFields, offset: Array, axes: Array | None) -
     fields = pose.model_dump(context=ReadingContext(), exclude_none=True, exclude={"xyz"})
     if turns or pose.rotation_form == "matrix":
         kept = fields.keys() - {pose.rotation_form}
-        rotation = pose.given_rotation
+        rotation = at[:3, :3]
         if turns:
             turn = offset[:3, :3] if axes is None else axes @ offset[:3, :3] @ axes.T
             rotation = rotation @ turn if axes is None else turn @ rotation

@@ -188,6 +188,7 @@ def read_rows(value: Any, context: ReadingContext) -> tuple[tuple[float, ...], .
         with flaws_below(index, 3):
             last = _RATIO if index == 3 else _LENGTH
             rows.append((*numbers, *(read_number(item, last, context.units) for item in row[3:])))
+    context.has_matrix = True
     return tuple(rows)
 
 

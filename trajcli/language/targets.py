@@ -204,11 +204,6 @@ class PoseFields(Model):
         """Whether the position is fixed."""
         return self.xyz is not None or (self.matrix is not None and len(self.matrix) == 4)
 
-    @property
-    def given_rotation(self) -> Array:
-        """The orientation (3, 3); a matrix as it is given."""
-        return self.full_pose()[:3, :3] if self.matrix is None else np.array([r[:3] for r in self.matrix[:3]])
-
     def full_pose(self) -> Array:
         """Return the pose (4, 4), lengths in m; what is not given is zero."""
         written: dict[str, Any] = {} if self.xyz is None else {"xyz": self.xyz}

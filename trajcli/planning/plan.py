@@ -298,9 +298,9 @@ def _resolved(
 def _events_of(pose: ResolvedPose | None, index: int | None) -> list[Event]:
     if pose is None:
         return []
-    from trajcli.planning.resolve_poses import branch_events, nearest_rotation_events
+    from trajcli.planning.resolve_poses import branch_events
 
-    events = [*nearest_rotation_events(pose), *pose.events, *(branch_events(pose) if index is None else ())]
+    events = [*pose.events, *(branch_events(pose) if index is None else ())]
     return [replace(event, move=index) for event in events]
 
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from trajcli.kinematics.inverse.target import IkTarget
     from trajcli.kinematics.inverse.vendor_flags import VendorFlags
 
-_NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
-
 
 @frozen
 class ResolvedPose:
@@ -166,17 +164,3 @@ def asked_names(wanted: Configuration | None) -> dict[str, str]:
         return {}
     flags = wanted.flags
     return wanted.branch_names if flags is None else dict([flags.text.split(" ", 1)])
-
-
-def nearest_rotation_events(pose: ResolvedPose) -> list[Event]:
-    """Return the event that a matrix was not quite a rotation, so that the nearest one is taken."""
-    if pose.target.matrix is None:
-        return []
-    from trajcli.geometry.rotation import rotation_defect
-
-    defect = float(rotation_defect(np.array([row[:3] for row in pose.target.matrix[:3]])))
-    if defect <= _NOTED:
-        return []
-    return [
-        Event("nearest_rotation", f"the matrix is off a rotation by {defect:.3g}: the nearest one is taken")
-    ]
