@@ -155,11 +155,11 @@ class MotionSearch:
 
     def _flown(self, row: ChainRow, found: FoundStates) -> tuple[FoundStates, list[FlownPart]]:
         """Return the parts of a motion, and its states: those at borders near which laws fail are calmed."""
-        known, failed = self._stopping.parts(self.chain), list[NoLawError]()
+        kept, failed = self._stopping.parts(self.chain), list[NoLawError]()
         longest = _LONGER * found.duration
         while True:
             try:
-                return found, flown_parts(self.chain, row, found.states, self._laws, known, self._doubtful)
+                return found, flown_parts(self.chain, row, found.states, self._laws, kept, self._doubtful)
             except NoLawError as error:
                 failed.append(error)
                 self._doubtful.update(error.failing)
@@ -222,15 +222,15 @@ class MotionSearch:
             return parts
         bent = np.repeat([not course.uniform for course in self.chain.courses], 2)
         bent[[0, -1]] = False
-        known = self._stopping.parts(self.chain)
-        bent[[2 * k + side for k in known for side in (0, 1)]] = False
+        kept = self._stopping.parts(self.chain)
+        bent[[2 * k + side for k in kept for side in (0, 1)]] = False
         states = self._motion.states
         for _ in range(_TRIES):
             states = np.where(bent[:, None], states * [_FASTER, _STEEPER], states)
             try:
                 if any(findings for findings, _ in self._over(states)):
                     break
-                other = flown_parts(self.chain, self._motion.row, states, self._laws, known)
+                other = flown_parts(self.chain, self._motion.row, states, self._laws, kept)
             except PlanningError:
                 break
             if duration_of(other) > duration_of(parts) * (1 - _ENOUGH):

@@ -198,13 +198,13 @@ def _completed(
     return completed
 
 
-def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart], known: float = math.inf) -> FoundStates:
-    """Return the fastest chain whose nodes have states of their grids, if it lasts less than is `known`.
+def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart], longest: float = math.inf) -> FoundStates:
+    """Return the fastest chain whose nodes have states of their grids, if it lasts less than `longest`.
 
     What all joints need together in a zone is looked up for those of the best chain alone.
     """
     pairs = list(zip(grids[:-1], grids[1:], parts, strict=True))
-    costs = _costs(pairs, known)
+    costs = _costs(pairs, longest)
     looked_up: set[tuple[int, int, int]] = set()
     for _ in range(_LOOKED_UP):
         chosen = _cheapest(costs)
@@ -226,10 +226,10 @@ def _fastest(grids: Sequence[Array], parts: Sequence[ChainPart], known: float = 
     return FoundStates(states, tuple(float(cost[i, j]) for cost, i, j in pairs_chosen))
 
 
-def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], known: float) -> list[Array]:
+def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], longest: float) -> list[Array]:
     """Return durations of parts between states of grids, (p, q) each: in zones what the slowest joint needs.
 
-    The joints come one after another; pairs through which no chain is faster than is `known` are left out.
+    The joints come one after another; pairs whose chains all last more than `longest` are left out.
     """
     zones = [
         part.between(before, after) if isinstance(part, ZonePart) else None for before, after, part in pairs
@@ -239,17 +239,17 @@ def _costs(pairs: Sequence[tuple[Array, Array, ChainPart]], known: float) -> lis
         part.durations(before, after) if isinstance(part, PathPart) else np.zeros((len(before), len(after)))
         for before, after, part in pairs
     ]
-    first = not math.isfinite(known)
+    first = not math.isfinite(longest)
     for turn in range(max(map(len, orders))):
         reached, left = least_sums(costs)
         for k, (zone, order) in enumerate(zip(zones, orders, strict=True)):
             if zone is not None and turn < len(order):
                 least = reached[k][:, None] + costs[k] + left[k + 1]
-                i, j = np.nonzero(least <= known * _SUMMED)
+                i, j = np.nonzero(least <= longest * _SUMMED)
                 slower = zone.durations(i, j, order[turn : turn + 1])[:, 0]
                 costs[k][i, j] = np.maximum(costs[k][i, j], slower)
         if first:
-            known = min(known, _lasts(pairs, _cheapest(costs)))
+            longest = min(longest, _lasts(pairs, _cheapest(costs)))
     return costs
 
 
