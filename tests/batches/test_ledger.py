@@ -42,6 +42,15 @@ def test_a_file_has_the_hash_of_its_content(tmp_path: Path) -> None:
     assert hash_of_file(str(tmp_path / "none.csv")) is None
 
 
+def test_an_entry_takes_the_place_of_that_of_the_same_output(tmp_path: Path) -> None:
+    path, newer = tmp_path / "ledger.json", LedgerEntry("cc", (), "dd", 0.0)
+    for entry in (ENTRY, newer):
+        write_ledger(path, {"a.csv": entry})
+    assert read_ledger(path) == {"a.csv": newer}
+    path.write_bytes(path.read_bytes().replace(b'"layout": 1', b'"layout": 2'))  # of another version
+    assert read_ledger(path) == {}
+
+
 def test_entries_are_added_to_those_of_other_outputs(tmp_path: Path) -> None:
     path = tmp_path / "ledger.json"
     write_ledger(path, {})
@@ -56,6 +65,7 @@ def test_entries_are_added_to_those_of_other_outputs(tmp_path: Path) -> None:
     [
         b"",
         b"[]",
+        b'{"layout": 1, "outputs": []}',
         b"{",
         b"\xff",
         b'{"layout": 2, "outputs": {}}',

@@ -31,14 +31,14 @@ def two(tmp_path: Path) -> list[BatchJob]:
 def test_entries_stand_in_the_ledger_beside_their_rows(two: list[BatchJob], tmp_path: Path) -> None:
     entries = {job.output: written(Path(job.output), job.job) for job in two}
     record = Ledgers(two)
-    assert record.known() == {}
+    assert record.entries() == {}
     for job in two:
         record.add(job, entries[job.output])
     assert not list(tmp_path.rglob(LEDGER_NAME))  # a batch of five seconds writes them once
     record.write()
     assert read_ledger(tmp_path / "out/a" / LEDGER_NAME).keys() == {"p.csv", "q.csv"}
     assert read_ledger(tmp_path / "out/b" / LEDGER_NAME).keys() == {"p.csv"}
-    assert Ledgers(two).known() == entries
+    assert Ledgers(two).entries() == entries
 
 
 def test_a_long_batch_writes_its_ledgers_on_the_way(

@@ -7,6 +7,7 @@ import os
 import signal
 import time
 from contextlib import closing
+from itertools import count
 from pathlib import Path
 from typing import NoReturn
 
@@ -44,9 +45,19 @@ def half_written() -> NoReturn:
     raise AssertionError
 
 
+def met() -> None:
+    """Wait for another process that does the same at the same time."""
+    Path(f"{os.getpid()}.here").touch()
+    while len(list(Path().glob("*.here"))) < 2:
+        time.sleep(0.005)
+
+
 DEEDS = {
+    "met": met,
+    "met again": met,
     "killed": killed,
     "exit": lambda: os._exit(5),
+    "gone": lambda: os._exit(0),
     "endless": endless,
     "stubborn": stubborn,
     "half_written": half_written,
@@ -104,6 +115,12 @@ def test_a_crash_costs_one_job(count: int) -> None:
     assert {found["killed"].exit_code, found["exit"].exit_code} == {70}
 
 
+def test_a_process_that_ends_without_a_word_has_crashed() -> None:
+    gone = outcomes("gone")["gone"]
+    assert (gone.outcome, gone.exit_code) == ("crashed", 70)
+    assert gone.problems[0].message == "the process that planned it ended with exit code 0"
+
+
 def test_a_process_without_memory_is_replaced() -> None:
     found = outcomes("a", "memory", "b")
     assert found["a"].inputs == found["memory"].inputs != found["b"].inputs
@@ -118,6 +135,44 @@ def test_what_does_not_end_is_ended(name: str) -> None:
     assert (found[name].outcome, found[name].exit_code) == ("timed out", 3)
     assert found[name].problems[0].message == "it was not done within 0.5 s"
     assert found["b"].outcome == "written"
+
+
+def test_as_many_processes_as_asked_for_work_at_a_time() -> None:
+    found = outcomes("met", "met again", count=2, timeout=30.0)
+    assert [outcome.outcome for outcome in found.values()] == ["written"] * 2
+
+
+def test_a_task_is_ended_at_the_first_look_after_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a clock that goes on by a second whenever somebody looks at it."""
+    clock = count()
+    monkeypatch.setattr(processes, "monotonic", lambda: float(next(clock)))
+    ticks = list[int]()
+    tasks = [Task(BatchJob("endless", "x.csv"), None)]
+    with closing(run_in_processes(tasks, SETUP, 1, 2.5, lambda: ticks.append(1))) as done:
+        (outcome,) = done
+    assert (outcome.outcome, outcome.exit_code, outcome.seconds) == ("timed out", 3, 3.0)
+    assert len(ticks) == 3
+
+
+def test_a_process_that_was_killed_while_it_did_nothing_is_replaced() -> None:
+    tasks = [Task(BatchJob(name, f"{name}.csv"), None) for name in "ab"]
+    with closing(run_in_processes(tasks, SETUP, 1, None)) as done:
+        first = next(done)
+        (worker,) = multiprocessing.active_children()
+        worker.kill()
+        worker.join()
+        second = next(done)
+    assert (second.job.job, second.outcome) == ("b", "written")
+    assert first.inputs != second.inputs
+
+
+def test_an_interrupt_of_a_terminal_is_left_to_the_process_that_gives_tasks() -> None:
+    tasks = [Task(BatchJob(name, f"{name}.csv"), None) for name in "ab"]
+    with closing(run_in_processes(tasks, SETUP, 1, None)) as done:
+        first = next(done)
+        os.kill(int(first.inputs or 0), signal.SIGINT)
+        second = next(done)
+    assert (second.outcome, second.inputs) == ("written", first.inputs)
 
 
 def test_what_a_killed_process_has_half_written_is_removed() -> None:

@@ -55,7 +55,9 @@ def test_rows_are_the_quintic_and_the_entry_says_of_what(job: BatchJob) -> None:
     s = np.linspace(0, 1, 11)
     np.testing.assert_allclose(t, 2 + s, atol=1e-9)
     np.testing.assert_allclose(q, 30 * (10 * s**3 - 15 * s**4 + 6 * s**5), atol=1e-8)
+    os.utime(job.output, (1e9, 1e9))
     again = run_task(Task(job, outcome.entry), CSV)
+    assert Path(job.output).stat().st_mtime == 1e9
     assert again == replace(outcome, outcome="unchanged", seconds=again.seconds)
 
 
@@ -118,6 +120,8 @@ def test_a_batch_says_at_which_times_rows_stand_and_for_whom(job: BatchJob) -> N
         assert run_task(Task(job, None), BatchSetup("csv", {}, rows)).outcome == "written"
         counts[rows] = len(read_csv(job.output).columns)
     assert counts == {None: 11, "knots": 2, "both": 11}
+    both = run_task(Task(job, None), BatchSetup("csv", {}, "both"))
+    assert run_task(Task(job, both.entry), BatchSetup("csv", {}, "both")).outcome == "unchanged"
     unknown = run_task(Task(job, None), BatchSetup("csv", {}, consumer="nobody"))
     assert (unknown.outcome, unknown.exit_code) == ("failed", InputError.exit_code)
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from trajcli.errors import InputError, PlanningError
+from trajcli.job.robot import load_robot
+from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import partial_target
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.language.poses import Configuration
@@ -120,6 +122,30 @@ def test_answers_outside_the_range_are_told_on_request() -> None:
     with pytest.raises(PlanningError, match="only outside the limits") as caught:
         require_answer(tight, solutions, chosen, asked)
     assert caught.value.problems[0].hint == "no other branch is inside either"
+
+
+def test_the_closure_is_the_larger_of_the_two_misses() -> None:
+    arm, wanted = planar(*WIDE), Wanted(partial_target(POINT))
+    solutions, chosen = find_answers(arm, wanted, None, 1e-6)
+    misses = np.array([[1e-7, 3e-7], [4e-7, 2e-7]])
+    found = answer_reports(arm, replace(solutions, closure=misses), chosen, wanted)
+    assert [report["closure"] for report in found] == [3e-7, 4e-7]
+
+
+def test_the_numbers_of_a_maker_choose_one_answer_each() -> None:
+    """ABB, `confdata`: cfx tells the eight postures apart, and is even where joint 5 is above zero."""
+    arm = ArmInUnits(load_robot("irb120"), Units())
+    pose = forward(arm.robot, np.array([0.4, 0.3, -0.2, 0.9, 0.7, -0.5]))
+    wanted = Wanted(partial_target(pose[:3, 3], rotation=pose[:3, :3]))
+    solutions, chosen = find_answers(arm, wanted, None, 1e-6)
+    assert chosen.sum() > 2
+    postures = []
+    for posture in range(8):
+        asked = replace(wanted, configuration=Configuration(abb=(0, 0, -1, posture)))
+        met = find_answers(arm, asked, None, 1e-6)[1]
+        assert ((solutions.joints[met][:, 4] > 0) == (posture % 2 == 0)).all()
+        postures.append(met)
+    assert (np.sum(postures, axis=0) == chosen).all()
 
 
 @pytest.mark.parametrize("configuration", [None, Configuration(elbow="up")])

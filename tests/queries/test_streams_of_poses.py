@@ -111,6 +111,10 @@ def test_every_answer_of_every_row_has_its_number_its_branch_and_whether_it_is_i
     later = EveryAnswer(arm, blocks("xyz", p[:1], p[2:]), None, 1e-9)
     assert len(b"".join(later.lines(9)).splitlines()) == 5
     assert later.missed == 2
+    p[1:] = 2.0
+    none = EveryAnswer(arm, blocks("xyz", p[:1], p[1:3], p[3:]), None, 1e-9)
+    assert len(b"".join(none.lines(9)).splitlines()) == 3
+    assert none.missed == 1
     outside = EveryAnswer(
         planar((-400, 400), (-10, 10)), blocks("xyz", points((10, 5), (10, 60))), None, 1e-9
     )

@@ -326,7 +326,7 @@ def batch(
     count = _processes(processes, timeout)
     found = find_jobs(_listed(jobs), None if output is None else str(output), form)
     ledgers = Ledgers(found.jobs)
-    entries = {} if force else ledgers.known()
+    entries = {} if force else ledgers.entries()
     tasks = [Task(job, entries.get(job.output)) for job in found.jobs]
     setup = BatchSetup(form, found.owners(), rows, consumer, strict)
     outcomes: list[JobOutcome] = []

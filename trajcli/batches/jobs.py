@@ -62,9 +62,9 @@ def find_jobs(names: Sequence[str], folder: str | None, form: FormatName) -> Bat
         InputError: When there is no job or no such format, or two things would be in one file.
         FileError: When a folder cannot be read.
     """
-    ending = next((ending for ending, known in ENDINGS.items() if form in known), None)
+    ending = next((ending for ending, forms in ENDINGS.items() if form in forms), None)
     if ending is None:
-        formats = dict.fromkeys(name for known in ENDINGS.values() for name in known)
+        formats = dict.fromkeys(name for forms in ENDINGS.values() for name in forms)
         raise InputError(f"rows are written in no format {form!r}", hint=f"formats: {', '.join(formats)}")
     jobs: list[BatchJob] = []
     no_jobs: list[str] = []
@@ -141,7 +141,7 @@ class Ledgers:
         self._entries = dict[str, LedgerEntry]()
         self._written = monotonic()
 
-    def known(self) -> dict[str, LedgerEntry]:
+    def entries(self) -> dict[str, LedgerEntry]:
         """Return what outputs were made of, as far as the ledgers say."""
         ledgers = {path: read_ledger(path) for path in set(self._paths.values())}
         entries = ((output, ledgers[path].get(_name(output))) for output, path in self._paths.items())

@@ -94,12 +94,12 @@ class Task:
 
     Attributes:
         job: What is read and written.
-        known: What its output was made of when it was written; None to plan it in any case.
+        entry: What its output was made of when it was written; None to plan it in any case.
         settings: What takes the place of the job's own values.
     """
 
     job: BatchJob
-    known: LedgerEntry | None
+    entry: LedgerEntry | None
     settings: tuple[Setting, ...] = ()
 
 
@@ -186,13 +186,13 @@ class InputsHash:
 
 def _unchanged(task: Task, setup: BatchSetup) -> LedgerEntry | None:
     """Return the entry of an output that is as it would be written; None where it has to be planned."""
-    known, job = task.known, task.job
-    if known is None or hash_of_file(job.output) != known.output:
+    entry, job = task.entry, task.job
+    if entry is None or hash_of_file(job.output) != entry.output:
         return None
     folder = Path(job.job).parent
-    files = [str(folder / file) for file in known.files]
+    files = [str(folder / file) for file in entry.files]
     now = hash_of_inputs(Path(job.job).name, read_bytes(job.job), files, setup.said)
-    return known if now == known.inputs else None
+    return entry if now == entry.inputs else None
 
 
 def _written(task: Task, setup: BatchSetup, hashed: InputsHash) -> LedgerEntry:

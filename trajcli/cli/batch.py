@@ -38,7 +38,7 @@ def run_batch(options: BatchCommand) -> int:
     limits = processes_of(options), timeout_of(options)
     found = find_jobs(options.jobs, options.output, options.form)
     record = Ledgers(found.jobs)
-    known = {} if options.force else record.known()
+    known = {} if options.force else record.entries()
     tasks = [Task(job, known.get(job.output)) for job in found.jobs]
     setup = BatchSetup(options.form, found.owners(), options.rows, options.consumer, options.strict)
     progress = Progress(len(tasks))

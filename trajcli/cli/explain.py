@@ -75,8 +75,8 @@ def run_explain(options: ExplainCommand) -> int:
     loaded = load_job(options.job, options.override)
     count = len(loaded.job.moves)
     if options.move is not None and not 0 <= options.move < count:
-        known = "its only move is 0" if count == 1 else f"its moves are 0 to {count - 1}"
-        raise InputError(f"--move {options.move}: {loaded.name} has no such move", hint=known)
+        hint = "its only move is 0" if count == 1 else f"its moves are 0 to {count - 1}"
+        raise InputError(f"--move {options.move}: {loaded.name} has no such move", hint=hint)
     with progress():
         plan = plan_of(loaded)
         explained = explanation(
@@ -225,10 +225,10 @@ def _peaks(move: ExplainedMove) -> Iterator[str]:
         size = max(abs(peak.low), abs(peak.high))
         largest[peak.quantity] = max(largest.get(peak.quantity, 0.0), size)
     for peak in move.peaks:
-        size, most = max(abs(peak.low), abs(peak.high)), largest[peak.quantity]
+        size = max(abs(peak.low), abs(peak.high))
         # a rate is rounding, too, where over the whole move it would hardly change what it is the rate of
-        most = max(most, largest[_SLOWER[peak.quantity]] / (move.duration or 1.0))
-        nothing = (_ROUNDING if move.tool is None else _FITTED) * most
+        scale = max(largest[peak.quantity], largest[_SLOWER[peak.quantity]] / (move.duration or 1.0))
+        nothing = (_ROUNDING if move.tool is None else _FITTED) * scale
         if size <= nothing and peak.quantity != "position":
             continue
         nothing = max(_ROUNDING * size, nothing if move.tool else 0.0)
@@ -314,12 +314,12 @@ def _savings(savings: Sequence[SavingReport] | None) -> Iterator[str]:
     if not savings:
         yield "  its limits do not say how long it lasts: none that is higher would save time"
         return
-    useful = [one for one in savings if one.saved]
-    if not useful:
+    if not any(one.saved or one.reason for one in savings):
         yield "  no limit of a joint that is 10 % higher would save time"
-    for one in useful:
-        share = f" ({100 * one.share:.4g} %)" if one.share is not None else ""
-        yield f"  10 % more {one.quantity} of {one.joint} would save {one.saved:.6g} s{share}"
+    for one in savings:
+        if one.saved:
+            share = f" ({100 * one.share:.4g} %)" if one.share is not None else ""
+            yield f"  10 % more {one.quantity} of {one.joint} would save {one.saved:.6g} s{share}"
     for one in savings:
         if one.reason is not None:
             yield f"  10 % more {one.quantity} of {one.joint}: {one.reason}"
