@@ -1,0 +1,105 @@
+"""What kind of file it is: rows, messages, logs or a job, by its name, its first bytes, and what is asked of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajcli.errors import InputError
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.reading import (
+    format_of_rows,
+    is_job,
+    is_ros_message,
+    motion_files,
+    open_rows_of,
+    read_table,
+)
+
+JOB = "version: 1\nrobot: ur5e\nstart: {joints: 0}\nmoves: []\n"
+POINT = '{"positions": [0.5], "time_from_start": {"sec": 1, "nanosec": 0}}'
+MESSAGE = f'{{"joint_names": ["a"], "points": [{POINT}]}}'
+
+
+def written(folder: Path, text: str | bytes, name: str = "file") -> Path:
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "job"),
+    [
+        (JOB, True),
+        (f"# a job\n---\n{JOB}", True),
+        (json.dumps({"version": 1, "robot": "ur5e"}), True),
+        ("t,q1\n0,1\n", False),
+        ("# of a logger\n\n0 1 2\n", False),
+        ("% of Matlab\n0;1;2\n", False),
+        ("\ufefft\tq1\n0\t1\n", False),
+        ('{"t": 0, "q": [0]}\n', False),
+        (f"---\n{MESSAGE}\n", False),
+        (b"\x93NUMPY\x01\x00", False),
+        (b"\x89MCAP0\r\n", False),
+    ],
+)
+def test_a_file_without_an_ending_is_a_job_by_how_it_begins(
+    text: str | bytes, job: bool, tmp_path: Path
+) -> None:
+    assert is_job(str(written(tmp_path, text))) == job
+
+
+def test_what_is_not_there_is_a_job_and_a_folder_is_none(tmp_path: Path) -> None:
+    """Who reads it says that it is missing."""
+    assert is_job(str(tmp_path / "none"))
+    assert not is_job(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ('{"t": 0, "q": [0]}\n{"t": 1, "q": [1]}\n', "jsonl"),
+        ('\ufeff{"t": 0, "q": [0]}\n', "jsonl"),
+        (MESSAGE, "ros"),
+        (f"goal:\n- {MESSAGE[1:-1]}", "ros"),
+        ("t,q1\n0,1\n", "csv"),
+        (b"PK\x03\x04" + b"\0" * 26 + b"t.npy" + b"\0" * 9, "npz"),
+    ],
+)
+def test_the_format_of_rows_is_seen_in_their_first_bytes(
+    text: str | bytes, kind: str, tmp_path: Path
+) -> None:
+    assert format_of_rows(ByteSource(written(tmp_path, text, "rows.log"))) == kind
+
+
+@pytest.mark.parametrize(
+    "text", ["joint_names: [a]\n", "- joint_names: [a]\n", MESSAGE, "goal:\n  'joint_names' : [a]\n"]
+)
+def test_a_message_has_the_names_of_joints_at_the_start_of_a_line(text: str, tmp_path: Path) -> None:
+    assert is_ros_message(written(tmp_path, text, "a.yaml"))
+    assert not is_ros_message(written(tmp_path, JOB + "name: of joint_names\n", "b.yaml"))
+
+
+@pytest.mark.parametrize("option", ["topic", "field"])
+def test_what_is_asked_of_a_log_is_refused_of_other_files_by_its_name(option: str, tmp_path: Path) -> None:
+    rows = written(tmp_path, "t,q1\n0,1\n", "rows.csv")
+    with pytest.raises(InputError, match=f"--{option} is about MCAP, and .*rows.csv is none"):
+        open_rows_of(rows, **{option: "/a"})  # type: ignore[arg-type]
+    assert read_table(rows, topic="/a").names == ("t", "q1")
+
+
+def test_hidden_files_are_no_motions_of_a_folder(tmp_path: Path) -> None:
+    for name in (".hidden/a.csv", "shown/.b.csv", "shown/c.csv", "d.npy", "job.yaml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        written(tmp_path, JOB, name)
+    assert motion_files(str(tmp_path)) == [str(tmp_path / name) for name in ("d.npy", "shown/c.csv")]
+
+
+def test_numbers_of_binary_files_have_every_decimal(tmp_path: Path) -> None:
+    np.save(tmp_path / "rows.npy", np.array([[0.0, 0.1 + 0.2], [1.0, 1 / 3]]))
+    table = read_table(tmp_path / "rows.npy")
+    (value,) = {float(f"{each:.{table.decimals[1]}f}") - each for each in table.columns[:, 1]}
+    assert value == 0.0
