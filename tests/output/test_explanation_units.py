@@ -164,6 +164,13 @@ def test_every_number_is_in_the_units_of_the_job(name: str) -> None:
     assert set(expected[name].split()) <= seen
 
 
+def test_rates_of_an_explanation_are_per_second() -> None:
+    user, _ = both(JOINTS)
+    for joint, unit in (("slide", "mm"), ("turn", "deg")):
+        of_joint = [peak["unit"] for peak in user["moves"][0]["peaks"] if peak["joint"] == joint]
+        assert of_joint == [unit, f"{unit}/s", f"{unit}/s^2", f"{unit}/s^3"]
+
+
 def test_a_report_stays_in_si() -> None:
     """The report of a job in mm and deg is that of the same job in SI."""
     texts = [f"version: 1\n{units}{JOINTS}" for units in ("units: {angle: deg, length: mm}\n", "")]

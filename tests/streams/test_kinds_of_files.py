@@ -38,7 +38,8 @@ def written(folder: Path, text: str | bytes, name: str = "file") -> Path:
         (json.dumps({"version": 1, "robot": "ur5e"}), True),
         ("t,q1\n0,1\n", False),
         ("# of a logger\n\n0 1 2\n", False),
-        ("% of Matlab\n0;1;2\n", False),
+        ("% rate: 100 Hz\n0;1;2\n", False),
+        ("---\n---\nt;q1\n0;1\n", False),
         ("\ufefft\tq1\n0\t1\n", False),
         ('{"t": 0, "q": [0]}\n', False),
         (f"---\n{MESSAGE}\n", False),
@@ -96,6 +97,13 @@ def test_hidden_files_are_no_motions_of_a_folder(tmp_path: Path) -> None:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         written(tmp_path, JOB, name)
     assert motion_files(str(tmp_path)) == [str(tmp_path / name) for name in ("d.npy", "shown/c.csv")]
+
+
+def test_rows_without_times_are_at_the_rate_that_is_said(tmp_path: Path) -> None:
+    rows = written(tmp_path, "q1,q2\n1,2\n3,4\n5,6\n", "rows.csv")
+    table = read_table(ByteSource(rows, rate=4.0))
+    assert table.names == ("t", "q1", "q2")
+    assert table.columns.tolist() == [[0, 1, 2], [0.25, 3, 4], [0.5, 5, 6]]
 
 
 def test_numbers_of_binary_files_have_every_decimal(tmp_path: Path) -> None:
