@@ -53,6 +53,7 @@ def test_a_path_a_text_a_mapping_and_a_read_job_give_the_same_plan(tmp_path: Pat
 
 def test_a_flow_mapping_is_a_text_and_a_name_is_a_path() -> None:
     assert is_yaml("{version: 1}")
+    assert is_yaml('{"version":1,"robot":"ur5e"}')
     assert is_yaml("version: 1")
     assert not is_yaml("folder/job.yaml")
     assert not is_yaml("C:/folder/job.yaml")
@@ -281,7 +282,9 @@ def test_the_page_runs_as_it_stands(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 def test_a_rounded_pose_is_projected_and_a_wrong_one_refused() -> None:
     robot = trajcli.load_robot("ur5e")
     pose = robot.fk([0.3, -1.2, 1.4, -0.7, 0.9, 0.2])
-    assert len(robot.ik(np.round(pose, 5))) == 8
+    found = robot.ik(np.round(pose, 5))
+    assert len(found) == 8
+    assert max(solution.closure for solution in found) < 1e-9, "of the rotation that is nearest"
     for wrong in (np.eye(3), 2 * pose, pose * [-1, 1, 1, 1], np.full((4, 4), np.nan)):
         with pytest.raises(trajcli.InputError):
             robot.ik(wrong)

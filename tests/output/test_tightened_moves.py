@@ -1,0 +1,127 @@
+"""Limits and stretches of moves whose rows pass something: by the powers of time with which derivatives fall."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+import pytest
+
+from trajcli.findings import Finding
+from trajcli.job.read import job_from_text
+from trajcli.output.delivery.slower_motion import may_be_cured, tightened
+from trajcli.planning.adaptation import Adaptation
+from trajcli.planning.plan import Plan, plan_job
+
+LIMITS = {"velocity": [[-1, 2], 1.5], "acceleration": [4, [-6, 3]], "jerk": [40, 30]}
+KINDS = ("velocity", "acceleration", "jerk")
+
+
+@cache
+def planned(when: str = "slow") -> Plan:
+    """Return the plan of three moves, of which nothing moves in the second; the last one moves the second joint."""
+    joint = {"velocity_by_position": {"deceleration": 5, "offset": 0.1}, "position": [-4, 4]}
+    job = {
+        "version": 1,
+        "robot": {"joints": [joint, {}]},
+        "limits": LIMITS,
+        "when_over_limit": when,
+        "start": {"joints": [0, 0]},
+        "moves": [
+            {"planner": "quintic", "to": {"joints": [-0.5, 0.2]}, "duration": 2},
+            {"planner": "hold", "duration": 0.5},
+            {"planner": "quintic", "to": {"joints": [-0.5, 0.6]}, "duration": 2, "when_over_limit": when},
+        ],
+    }
+    plan = plan_job(job_from_text(json.dumps(job)))
+    assert plan.verdict.passed
+    return plan
+
+
+def found(kind: str, excess: float, move: int, joint: str | None = "j1") -> Finding:
+    return Finding(kind, joint, excess, 1.0, time=0.0, move=move, message="over")
+
+
+def changed(
+    *uses: tuple[float, int, int, int], over: Any = (), adapted: Adaptation | None = None, **options: Any
+) -> Adaptation:
+    result = tightened(planned(), over, uses, adapted or Adaptation(), **options)
+    assert result is not None
+    return result
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_move_that_passes_little_is_stretched_by_the_root_of_it(order: int) -> None:
+    """A derivative of order k falls with the k-th power of time; what is passed by more than that is tightened."""
+    little = changed((1.002, order, 0, 0))
+    assert little.stretches == {0: pytest.approx(1.002 ** (1 / order), rel=1e-8)}
+    assert 1 < little.stretches[0] ** order / 1.002 < 1 + 1e-7
+    assert not little.caps
+    assert changed((1.3, order, 0, 0), stretched=True).stretches[0] == pytest.approx(1.3 ** (1 / order))
+
+
+def test_the_worst_of_a_move_counts_and_stretches_go_on_top_of_each_other() -> None:
+    uses = [(1.002, 1, 0, 0), (1.0025, 1, 1, 0), (1.001, 1, 0, 0)]
+    assert changed(*uses).stretches == {0: pytest.approx(1.0025)}
+    before = Adaptation(stretches={0: 1.1, 2: 1.2})
+    assert changed(*uses, adapted=before).stretches == {0: pytest.approx(1.1 * 1.0025), 2: 1.2}
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_what_is_passed_by_more_lowers_what_the_joint_has_reached(order: int, joint: int) -> None:
+    """Of bounds that differ by direction in proportion; a quintic over D in T has 15/8 D/T, 10/sqrt(3) D/T^2, 60 D/T^3."""
+    distance = (0.5, 0.2)[joint]
+    peak = distance * (15 / 8 / 2, 10 / 3**0.5 / 4, 60 / 8)[order - 1]
+    low, high = {
+        (1, 0): (1, 2), (2, 0): (4, 4), (3, 0): (40, 40), (1, 1): (1.5, 1.5), (2, 1): (6, 3), (3, 1): (30, 30),
+    }[order, joint]  # fmt: skip
+    largest, both = max(low, high), order > 1  # a velocity has one sign, the others both
+    sides = [low, high] if both else [low] if joint == 0 else [high]
+    reached = max(peak * largest / side for side in sides)
+    caps = changed((1.25, order, joint, 0)).caps
+    assert caps == {(0, KINDS[order - 1], joint): pytest.approx(min(reached, largest) / 1.25, rel=1e-6)}
+
+
+def test_a_cap_that_is_lower_already_is_what_is_lowered() -> None:
+    lower = Adaptation(caps={(0, "velocity", 1): 0.05})
+    assert changed((1.25, 1, 1, 0), adapted=lower).caps == {(0, "velocity", 1): pytest.approx(0.04)}
+
+
+def test_the_speed_by_position_falls_with_the_root_of_its_deceleration() -> None:
+    """|v| <= sqrt(2 d s) - o: for four fifths of the speed d is 16 twenty-fifths."""
+    caps = changed(over=[found("velocity_by_position", 1.25, 0)]).caps
+    assert caps == {(0, "velocity_by_position", 0): pytest.approx(5 / 1.25**2, rel=1e-6)}
+
+
+def test_a_tool_that_leaves_its_path_is_slowed_by_the_root_of_it() -> None:
+    """Rows leave a path by the square of the speed, at most to 0.7 of it in a round; derivatives fall by its powers."""
+    for excess, share in ((1.21, 1 / 1.1), (25.0, 0.7)):
+        caps = changed(over=[found("deviation", excess, 0, None)]).caps
+        speed = 0.5 * 15 / 8 / 2 * 2  # of the bound of 2 the other way, of 1 this way
+        assert caps[0, "velocity", 0] == pytest.approx(speed * share, rel=1e-6)
+        assert caps[0, "jerk", 1] == pytest.approx(0.2 * 60 / 8 * share**3, rel=1e-6)
+        assert len(caps) == 6
+    assert changed(over=[found("deviation", 1.21, 0, None)], stretched=True).stretches == {
+        0: pytest.approx(1.1)
+    }
+
+
+def test_where_the_arm_stands_the_moves_beside_it_are_slowed() -> None:
+    assert changed((1.002, 1, 1, 1)).stretches.keys() == {0, 2}
+    assert changed((1.002, 1, 1, 2)).stretches.keys() == {2}
+
+
+def test_what_no_slowness_cures_is_left() -> None:
+    hopeless = [
+        found("velocity", 1e4, 0),
+        found("deviation", 31.0, 0, None),
+        found("position", 1.1, 0),
+        Finding("velocity", "j1", 1.1, 1.0),
+    ]
+    for one in hopeless:
+        assert tightened(planned(), [found("velocity", 1.1, 0), one], (), Adaptation()) is None
+    assert [may_be_cured(one) for one in hopeless] == [True, True, False, False]
+    assert tightened(planned("error"), (), [(1.1, 1, 0, 0)], Adaptation()) is None
+    assert tightened(planned(), (), (), Adaptation()) is None
