@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 
 from trajcli.findings import Finding
@@ -93,6 +95,18 @@ def test_the_speed_by_position_falls_with_the_root_of_its_deceleration() -> None
     """|v| <= sqrt(2 d s) - o: for four fifths of the speed d is 16 twenty-fifths."""
     caps = changed(over=[found("velocity_by_position", 1.25, 0)]).caps
     assert caps == {(0, "velocity_by_position", 0): pytest.approx(5 / 1.25**2, rel=1e-6)}
+
+
+def test_an_effort_is_limited_by_less_than_its_larger_bound() -> None:
+    """What is reached of it is not asked: the proportion of a limit by direction is kept by who plans."""
+    plan = planned()
+    first, robot = plan.moves[0], plan.moves[0].robot
+    effort = np.array([[-60.0, 20.0], [-np.inf, np.inf]])
+    limited = replace(first, robot=replace(robot, limits=replace(robot.limits, effort=effort)))
+    heavy = replace(plan, moves=(limited, *plan.moves[1:]))
+    result = tightened(heavy, [found("effort", 1.25, 0)], (), Adaptation())
+    assert result is not None
+    assert result.caps == {(0, "effort", 0): pytest.approx(48)}
 
 
 def test_a_tool_that_leaves_its_path_is_slowed_by_the_root_of_it() -> None:
