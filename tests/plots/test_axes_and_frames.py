@@ -51,6 +51,8 @@ def around(low: float, high: float) -> Any:
         ([5, 5 + 3e-4], (-180, 180), 5, 5 + 3e-4),
         ([1e6, 1e6 + 1e-4], (), -1, 2e6 + 1),  # a billionth of the value is rounding
         ([1e6, 1e6 + 1e-2], (), 1e6, 1e6 + 1e-2),
+        ([0, 1e-10], (), -1, 1),
+        ([0, 1e-5], (-100, 1), 0, 1e-5),  # of the nearer limit
         ([0, NAN, 2, np.inf], (-np.inf, NAN), 0, 2),
     ],
 )
@@ -107,6 +109,8 @@ def test_ticks_are_within_the_view_and_few(most: int) -> None:
 
 def test_names_of_intervals_keep_half_a_letter_apart() -> None:
     width = text_width("31", 7.0)
+    assert width == pytest.approx(2 * 0.636 * 7 / 72, rel=1e-2)  # digits of DejaVu Sans: 0.636 em
+    assert labels_with_room(["31"] * 2, np.array([1.0, 2.0]), np.array([0.0, 1.0]), 7.0) == [(1, 2.0)]
     for gap, kept in ((3.4, [0, 2]), (3.6, [0, 1, 2])):
         middles = np.arange(3) * (width + gap / 72)
         assert [k for k, _ in labels_with_room(["31"] * 3, middles, np.ones(3), 7.0)] == kept
@@ -224,7 +228,7 @@ def test_joints_are_chosen_in_their_own_order() -> None:
     assert choose_joints([], joints) == (0, 1, 2)
     assert choose_joints(["wrist", "base"], joints) == (0, 2)
     for names, message, hint in (
-        (["base", "elbov"], "there is no joint 'elbov'", "elbow"),
+        (["base", "elbov"], "there is no joint 'elbov'", "did you mean 'elbow'"),
         (["base", "nothing"], "there is no joint 'nothing'", "base, elbow, wrist"),
         (["base", "elbow", "base"], "the joint 'base' is asked for twice", "once"),
     ):
