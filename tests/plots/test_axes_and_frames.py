@@ -14,7 +14,18 @@ from trajcli.errors import InputError
 from trajcli.plots.axes import finite_limits, labels_with_room, note_of, text_width, ticks_of, view_of
 from trajcli.plots.choice import QUANTITY_NAMES, choose_joints, choose_quantities, parse_quantities
 from trajcli.plots.frame import LEFT, RIGHT, PanelFrame, Sheet, left_of, panel_width
-from trajcli.plots.legend import WAYPOINT, Legend, MoveTitles, _entries, marker_style, style_of
+from trajcli.plots.legend import (
+    FINDING,
+    MARKED,
+    START,
+    VIRTUAL_POINT,
+    WAYPOINT,
+    Legend,
+    MoveTitles,
+    _entries,
+    marker_style,
+    style_of,
+)
 from trajcli.plots.panel import NO_POINTS, MoveBorders, Panel, PanelBlock, PathViews, Picture, Trace
 
 NAN = np.nan
@@ -291,9 +302,9 @@ def test_borders_are_named_where_they_are_drawn(moves: int, shown: bool) -> None
 
 def test_a_legend_has_rows_for_all_its_entries() -> None:
     """Each name has the room of the longest, beside its sample."""
-    step = text_width("file10", 8.0) + 0.65
     for count in (1, 4, 5, 11):
-        names = tuple(f"file{k:02d}" for k in range(count))
+        names = tuple("file" + "x" * k for k in range(count))
+        step = text_width(names[-1], 8.0) + 0.65
         columns = int((6.0 - 0.4) / step)
         assert Legend(picture(sources=names), 6.0).height == pytest.approx(
             0.2 * -(-count // columns) + 0.1, abs=0.001
@@ -323,10 +334,15 @@ def test_titles_of_moves_stand_row_by_row() -> None:
     rows = sorted({round(3 - 3 * text.get_position()[1], 4) for text in sheet.figure.texts})
     assert titles.height == pytest.approx(0.155 * len(rows) + 0.08)
     assert rows[0] == pytest.approx(0.5 + 0.0775)
+    first, second, third, _ = (text.get_position() for text in sheet.figure.texts)
+    assert (second[1], third[0]) == (first[1], first[0])
+    assert second[0] > first[0]
 
 
 @pytest.mark.parametrize(("count", "small"), [(60, False), (61, True)])
 def test_many_markers_are_small(count: int, small: bool) -> None:
+    kinds = (WAYPOINT, VIRTUAL_POINT, FINDING, START, MARKED)
+    assert len({kind["marker"] for kind in kinds}) == len(kinds)
     style = marker_style(WAYPOINT, count)
     assert style["markersize"] == (1.5 if small else 3.5)
     assert (style["marker"], style["markerfacecolor"]) == ("o", "white")
@@ -335,6 +351,7 @@ def test_many_markers_are_small(count: int, small: bool) -> None:
 def test_the_first_source_is_the_thickest_and_continuous() -> None:
     assert (style_of(0)["linewidth"], style_of(0)["linestyle"]) == (1.2, "-")
     assert {style_of(k)["linewidth"] for k in range(1, 20)} == {1.0}
+    assert len({(style_of(k)["color"], str(style_of(k)["linestyle"])) for k in range(24)}) == 24
 
 
 def test_a_panel_without_markers_has_none() -> None:

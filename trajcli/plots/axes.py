@@ -72,10 +72,10 @@ def note_of(panel: Panel, view: tuple[float, float]) -> str:
     return f"limit{'s' * (len(named) > 1)} {', '.join(named)} out of view"
 
 
-def ticks_of(view: tuple[float, float], most: int) -> tuple[list[float], list[str]]:
+def ticks_of(view: tuple[float, float], count: int) -> tuple[list[float], list[str]]:
     """Return round numbers within a range, at most as many as asked for but two, and how they are written."""
     low, high = view
-    raw = (high - low) / most
+    raw = (high - low) / count
     magnitude = 10.0 ** floor(log10(raw))
     step = next(factor * magnitude for factor in _STEPS if factor * magnitude >= raw * (1 - 1e-9))
     first, last = ceil(low / step - 1e-9), floor(high / step + 1e-9)
@@ -108,10 +108,10 @@ def shortened(text: str, size: float, width: float) -> str:
     """Return a text that is no wider than `width` inches; what is left out is marked."""
     if text_width(text, size) <= width:
         return text
-    room, longest = width - text_width(_CUT, size), 0
+    space, longest = width - text_width(_CUT, size), 0
     step = 1 << (len(text) - 1).bit_length()
     while step:  # the width grows with the length
-        if longest + step < len(text) and text_width(text[: longest + step], size) <= room:
+        if longest + step < len(text) and text_width(text[: longest + step], size) <= space:
             longest += step
         step >>= 1
     return text[:longest] + _CUT if longest else ""

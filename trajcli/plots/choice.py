@@ -50,19 +50,19 @@ def parse_quantities(text: str) -> tuple[str, ...]:
     return tuple(name for name in QUANTITY_NAMES if name in names)
 
 
-def choose_joints(names: Sequence[str], known: Sequence[str]) -> tuple[int, ...]:
+def choose_joints(names: Sequence[str], joints: Sequence[str]) -> tuple[int, ...]:
     """Return the indices of the joints called `names`, in their own order; of all where none is named.
 
     Raises:
         InputError: When there is no such joint, or one is named twice.
     """
     for index, name in enumerate(names):
-        if name not in known:
-            hint = did_you_mean(name, known) or valid_names(known, "the joints are")
+        if name not in joints:
+            hint = did_you_mean(name, joints) or valid_names(joints, "the joints are")
             raise InputError(f"there is no joint '{name}'", hint=hint)
         if name in names[:index]:
             raise InputError(f"the joint '{name}' is asked for twice", hint="name it once")
-    return tuple(index for index, name in enumerate(known) if not names or name in names)
+    return tuple(index for index, name in enumerate(joints) if not names or name in names)
 
 
 def choose_quantities(
@@ -81,8 +81,8 @@ def choose_quantities(
     chosen = [name for name in (sensible if wanted is None else wanted) if name not in impossible]
     if wanted is not None and len(chosen) < len(wanted):
         refused = [name for name in wanted if name in impossible]
-        rest = [name for name in QUANTITY_NAMES if name not in impossible]
-        hint = valid_names(rest, "what can be plotted")
+        left = [name for name in QUANTITY_NAMES if name not in impossible]
+        hint = valid_names(left, "what can be plotted")
         raise InputError(
             "; ".join(f"'{name}' cannot be plotted: {impossible[name]}" for name in refused), hint=hint
         )
