@@ -108,10 +108,10 @@ def shortened(text: str, size: float, width: float) -> str:
     """Return a text that is no wider than `width` inches; what is left out is marked."""
     if text_width(text, size) <= width:
         return text
-    space, longest = width - text_width(_CUT, size), 0
+    width, longest = width - text_width(_CUT, size), 0
     step = 1 << (len(text) - 1).bit_length()
     while step:  # the width grows with the length
-        if longest + step < len(text) and text_width(text[: longest + step], size) <= space:
+        if longest + step < len(text) and text_width(text[: longest + step], size) <= width:
             longest += step
         step >>= 1
     return text[:longest] + _CUT if longest else ""

@@ -81,8 +81,7 @@ def choose_quantities(
     chosen = [name for name in (sensible if wanted is None else wanted) if name not in impossible]
     if wanted is not None and len(chosen) < len(wanted):
         refused = [name for name in wanted if name in impossible]
-        left = [name for name in QUANTITY_NAMES if name not in impossible]
-        hint = valid_names(left, "what can be plotted")
+        hint = valid_names([name for name in QUANTITY_NAMES if name not in impossible], "what can be plotted")
         raise InputError(
             "; ".join(f"'{name}' cannot be plotted: {impossible[name]}" for name in refused), hint=hint
         )
