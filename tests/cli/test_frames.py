@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.cli.frames import WIDTH, problem_as_json, render_problem
-from trajcli.errors import Amount, Place, Problem
+from trajcli.cli.frames import WIDTH, problem_as_json, render_problem, shown
+from trajcli.errors import LONGEST_LINE, Amount, Place, Problem
 
 LINE = "  - {planner: quintc, to: b, duration: 3}"
 
@@ -105,6 +105,66 @@ def test_a_token_longer_than_the_line_is_underlined_as_far_as_it_is_shown() -> N
     place = Place("f", 1, 4, "a: " + "z" * 500, 500)
     _, source, carets = render_problem(Problem("m", place=place), color=False).splitlines()
     assert carets.count("^") == source.count("z") > 80
+
+
+@pytest.mark.parametrize("width", [40, 60, 81])
+@pytest.mark.parametrize("at", [0, 20, 57, 300])
+@pytest.mark.parametrize(
+    "hint", ["short", "a hint of many words that takes more than a line of a terminal has", "日" * 17]
+)
+def test_no_line_is_wider_than_the_terminal_and_no_word_is_lost(width: int, at: int, hint: str) -> None:
+    line = "é: " + "日x" * at + "WRONG, " + "y" * 300
+    place = Place("job.yaml", 123456, 4 + 2 * at, line, 5)
+    message = "a message of so many words that it has to be folded on a terminal of eighty columns"
+    text = render_problem(Problem(message, hint, place), color=False, width=width)
+    rows = text.split("\n")
+    assert all(columns(row) <= width or " " not in row.strip(" =|^") for row in rows)
+    assert text.split(" | ")[0].replace("\n", " ").split() == [
+        "job.yaml:123456:" + f"{4 + 2 * at}:",
+        "error:",
+        *message.split(),
+        "123456",
+    ]
+    source = next(row for row in rows if row.startswith("123456 | "))
+    carets = rows[rows.index(source) + 1]
+    assert columns(source[: source.index("WRONG")]) == carets.index("^")
+    assert "".join(hint.split()) in "".join(text.split())
+
+
+def test_a_hint_stands_beside_the_carets_where_it_fits() -> None:
+    place = Place("f", 1, 1, "ab", 2)
+    for hint, width, beside in (
+        ("x" * 30, 40, True),
+        ("x" * 31, 40, False),
+        ("日" * 15, 40, True),
+        ("日" * 16, 40, False),
+    ):
+        rows = render_problem(Problem("m", hint, place), color=False, width=width).split("\n")
+        assert (rows[2] == f"     | ^^ {hint}") == beside
+        assert len(rows) == (3 if beside else 4)
+
+
+def test_what_is_shown_is_one_line_in_which_a_long_word_stays_whole() -> None:
+    assert shown("a\tb\u2028c\u2029d") == "a    b\\u2028c\\u2029d"
+    assert shown("x" * (LONGEST_LINE + 3)) == "x" * (LONGEST_LINE + 3)
+    assert shown("x" * (LONGEST_LINE + 4)) == "x" * LONGEST_LINE + "..."
+    word = "/a/path/that/is/longer/than/the/terminal/is/wide.yaml"
+    assert word in render_problem(Problem(f"there is no file {word} at all"), color=False, width=30)
+    place = Place("f", 1, 4, "\uff21\uff22 x", 1)  # wide letters
+    assert render_problem(Problem("m", place=place), color=False).splitlines()[2] == "     |      ^"
+
+
+def test_there_is_a_caret_behind_the_end_of_a_line() -> None:
+    for column in (3, 4):
+        rows = render_problem(Problem("m", place=Place("f", 1, column, "a:", 1)), color=False).splitlines()
+        assert rows[2] == "     |   ^"
+
+
+def test_numbers_of_json_are_finite_and_each_its_own() -> None:
+    found = problem_as_json(Problem("m", time=0.0, value=1.5, limit=-2.5))
+    assert (found["time"], found["value"], found["limit"]) == (0.0, 1.5, -2.5)
+    found = problem_as_json(Problem("m", time=math.nan, value=-math.inf, limit=0.0))
+    assert (found["time"], found["value"], found["limit"]) == (None, None, 0.0)
 
 
 def test_control_characters_of_messages_are_shown_as_escapes() -> None:

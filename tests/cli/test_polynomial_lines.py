@@ -124,6 +124,8 @@ def test_a_late_piece_is_printed_from_its_start_where_powers_of_t_would_lose_dig
     lines = list(polynomial_lines(move([late])))
     assert lines[0] == f"  q1(t) = 5 + 0.3 (t - {start:g}) - 0.2 (t - {start:g})^2 + 0.1 (t - {start:g})^3"
     assert lines[1] == f"  qd1(t) = 0.3 - 0.4 (t - {start:g}) + 0.3 (t - {start:g})^2"
+    short = row(0.0, 1e-3, 0, 0, 0, 1e9)
+    assert list(polynomial_lines(move([short]))) == ["  q1(t) = 1000000000 t^3"]
     near = row(3.0, 4.0, *Polynomial([5.0, 0.3])(Polynomial([-3.0, 1.0])).coef)
     assert list(polynomial_lines(move([near]))) == ["  q1(t) = 4.1 + 0.3 t"]
 
@@ -139,6 +141,11 @@ def test_shifted_moves_have_the_times_of_the_job_too() -> None:
     ]
 
 
+def test_what_a_difference_of_times_leaves_of_zero_is_zero() -> None:
+    shifted = move([row(0.3, 1, 1.0, unshifted=[1.0])], origin=0.1 + 0.2)
+    assert list(polynomial_lines(shifted))[2].startswith("    0 <= u <= 0.7: ")
+
+
 def test_what_nobody_reads_is_counted() -> None:
     many = [row(k, k + 1, k) for k in range(61)]
     told = polynomial_lines(move(many[:60], many[:60]))
@@ -147,6 +154,8 @@ def test_what_nobody_reads_is_counted() -> None:
     assert line == "  q1(t) .. q2(t): 61 pieces each of degree 0, listed by --json"
     (line,) = polynomial_lines(move(many, many[:60]))
     assert line == "  q1(t) .. q2(t): 121 pieces of degree 0, listed by --json"
+    (line,) = polynomial_lines(move([row(0, 1, 1)], [row(0, 1, *range(11))]))
+    assert line == "  q1(t) .. q2(t): 1 pieces each of degree 10, listed by --json"
     (line,) = polynomial_lines(move([row(0, 1, *range(11))]))
     assert line == "  q1(t): 1 pieces of degree 10, listed by --json"
     assert len(list(polynomial_lines(move([row(0, 1, *range(1, 11))])))) == 1

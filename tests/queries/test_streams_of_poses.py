@@ -14,6 +14,7 @@ from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import all_turns
 from trajcli.kinematics.inverse.solve import solve
+from trajcli.kinematics.inverse.target import partial_target
 from trajcli.kinematics.robot import Joint, Robot, unlimited
 from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.inverse_stream import EveryAnswer, joints_of
@@ -80,12 +81,13 @@ def test_a_stretched_arm_is_passed() -> None:
     np.testing.assert_allclose(found[2], [10, 0], atol=1e-3)
 
 
+@pytest.mark.parametrize("split", [0, 2])
 @pytest.mark.parametrize("names", [("x", "y", "z"), ("t", "x", "y", "z")])
-def test_a_row_out_of_reach_is_told_by_its_number_and_time(names: tuple[str, ...]) -> None:
+def test_a_row_out_of_reach_is_told_by_its_number_and_time(names: tuple[str, ...], split: int) -> None:
     p = points(*ROWS)
     p[3, 0] = 2.0
     table = np.column_stack([[5, 6, 7, 8.25], p])[:, 4 - len(names) :]
-    stream = joints_of(WIDE, blocks(names, table[:2], table[2:]), None, 1e-9)
+    stream = joints_of(WIDE, blocks(names, *(np.split(table, [split]) if split else [table])), None, 1e-9)
     when = r"row 3 \(t = 8\.25 s\)" if "t" in names else "row 3:"
     with pytest.raises(PlanningError, match=when):
         list(stream.blocks)
@@ -125,10 +127,10 @@ def test_every_answer_of_every_row_has_its_number_its_branch_and_whether_it_is_i
 def test_rows_that_are_wrong_are_told_by_their_number_in_the_file() -> None:
     arm = ArmInUnits(load_robot("ur5e"), Units("deg", "mm"))
     row = np.array([400.0, 100, 300, 0, 1, 0, 0])
-    wrong = row * [1, 1, 1, 1, 0.99, 1, 1]
+    wrong = row * [1, 1, 1, 1, 0.999, 1, 1]
     names = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
     for stream in (joints_of, EveryAnswer):
-        for bad in (wrong, row * [1, 1, 1, 1, 1.01, 1, 1]):
+        for bad in (wrong, row * [1, 1, 1, 1, 1.001, 1, 1]):
             made = stream(arm, blocks(names, np.tile(row, (3, 1)), np.vstack([row, bad, wrong])), None, 1e-6)
             with pytest.raises(InputError, match=r"poses\.csv, row 4: the quaternion has length"):
                 list(made.blocks if stream is joints_of else made.lines(9))
@@ -200,6 +202,37 @@ def test_each_row_takes_the_nearest_answer_inside_its_ranges(name: str, share: f
         last = answer
 
 
+def test_a_slide_makes_no_turns_however_long_it_is() -> None:
+    """A slide of 20 m that goes by more than 2 pi m in a step, and back."""
+    own = load_robot("scara")
+    bounds = np.where(np.array(own.joint_types)[:, None] == "prismatic", [[-10.0, 10.0]], [[-3.0, 3.0]])
+    robot = replace(own, limits=replace(own.limits, position=bounds))
+    slide = own.joint_types.index("prismatic")
+    q = np.column_stack([np.linspace(0.2, 0.9, 40)] * len(own.joints))
+    q[:, slide] = np.where(np.arange(40) % 9 > 4, 8.0, -1.0)
+    poses = forward(robot, q)
+    rows = np.hstack([poses[:, :3, 3], quaternion_from_matrix(poses[:, :3, :3])])
+    found = np.vstack(list(joints_of(ArmInUnits(robot, Units()), blocks(POSE, rows), q[0], 1e-6).blocks))
+    np.testing.assert_allclose(found[:, slide], q[:, slide], atol=1e-6)
+    np.testing.assert_allclose(forward(robot, found), poses, atol=1e-6)
+
+
+def test_a_joint_that_is_free_in_a_row_stays_near_to_the_row_before() -> None:
+    """Joints 4 and 6 of a wrist that is straight share a turn: of all pairs the nearest to the row before."""
+    robot = load_robot("puma560")
+    q = np.tile([0.2, 0.4, -1.8, 0.0, 0.5, 0.3], (30, 1))
+    q[:, 3] = np.linspace(0.1, 1.5, 30)
+    q[18, 4] = 0.0
+    poses = forward(robot, q)
+    rows = np.hstack([poses[:, :3, 3], quaternion_from_matrix(poses[:, :3, :3])])
+    mixed = ("qz", "qx", "x", "qw", "z", "qy", "y")
+    table = rows[:, [POSE.index(name) for name in mixed]]
+    found = np.vstack(list(joints_of(ArmInUnits(robot, Units()), blocks(mixed, table), q[0], 1e-6).blocks))
+    np.testing.assert_allclose(np.delete(found, 18, axis=0), np.delete(q, 18, axis=0), atol=1e-5)
+    np.testing.assert_allclose(forward(robot, found[18]), poses[18], atol=1e-6)
+    assert np.abs(found[18] - q[17])[[3, 5]].max() < 0.06
+
+
 def test_an_arm_without_a_closed_form_goes_on_inside_its_ranges() -> None:
     """Three turns in the plane: a step is the shortest, of Newton's method, where that stays inside and near."""
     free = unlimited(3)
@@ -220,3 +253,9 @@ def test_an_arm_without_a_closed_form_goes_on_inside_its_ranges() -> None:
     low, high = robot.limits.position.T
     assert ((found >= low - 1e-8) & (found <= high + 1e-8)).all()
     assert np.abs(np.diff(found[:50], axis=0)).max() < 0.15
+    solutions = solve(robot, partial_target(p[-1]), found[-2], 1e-9)
+    every = solutions.joints[solutions.within_limits]
+    assert np.abs(found[-1] - found[-2]).max() <= np.abs(every - found[-2]).max(axis=1).min() + 1e-6
+    far = np.vstack([p[:3], [[2.0, 0.0, 0.0]]])
+    with pytest.raises(PlanningError, match="row 3"):
+        list(joints_of(arm, blocks("xyz", far), q[0], 1e-9).blocks)

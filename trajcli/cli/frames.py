@@ -56,11 +56,11 @@ def render_problem(problem: Problem, *, color: bool, width: int | None = None) -
     if place is None or not place.source.strip():
         return "\n".join([*rows, *([paint(folded(f"  {hint}", width, "  "), _CYAN)] if hint else [])])
     gutter = " " * max(4, len(str(place.line)))
-    room = WIDTH if width is None else width - len(gutter) - 3
-    source, offset, length = _window(place, room)
+    space = WIDTH if width is None else width - len(gutter) - 3
+    source, offset, length = _window(place, space)
     rows.append(f"{place.line:>{len(gutter)}} | {source}")
     carets = f"{gutter} | {' ' * offset}{paint('^' * length, _RED)}"
-    fits = offset + length + 1 + sum(cell.width for cell in map(_cell, hint)) <= room
+    fits = offset + length + 1 + sum(cell.width for cell in map(_cell, hint)) <= space
     if hint and fits:
         carets += f" {paint(hint, _CYAN)}"
     rows.append(carets)

@@ -246,8 +246,8 @@ class _Moves:
             return _validated(stood, info.context)  # for the places of the flaws
         if len(once) == len(value):
             return moves
-        known = dict(zip(first, moves, strict=True))
-        return [known[id(entry)] for entry in value]
+        read = dict(zip(first, moves, strict=True))
+        return [read[id(entry)] for entry in value]
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -307,8 +307,8 @@ def _tags_of(moves: Any) -> frozenset[str]:  # noqa: ANN401
     if not isinstance(moves, list) or not moves:
         return frozenset((*PLANNERS, *HANDLING))
     tags = [m.get("planner") if isinstance(m, Mapping) else getattr(m, "planner", None) for m in moves]
-    known = [tag for tag in tags if isinstance(tag, str) and (tag in PLANNERS or tag in HANDLING)]
-    return frozenset(known if len(known) == len(moves) else (*PLANNERS, *HANDLING))
+    right = [tag for tag in tags if isinstance(tag, str) and (tag in PLANNERS or tag in HANDLING)]
+    return frozenset(right if len(right) == len(moves) else (*PLANNERS, *HANDLING))
 
 
 @cache
@@ -429,11 +429,11 @@ class Job(Model):
 
     @model_validator(mode="after")
     def _rows_are_in_a_frame(self) -> Job:
-        name, known = self.output.frame, (*self.frames, "world", "base")
-        if name is not None and name not in known:
+        name, names = self.output.frame, (*self.frames, "world", "base")
+        if name is not None and name not in names:
             from trajcli.suggest import did_you_mean, valid_names
 
-            hint = did_you_mean(name, known) or valid_names(known, "frames")
+            hint = did_you_mean(name, names) or valid_names(names, "frames")
             raise refuse([(("output", "in"), f"there is no frame '{name}'", hint)])
         return self
 
