@@ -84,7 +84,6 @@ def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) 
 def _concessions(plan: Plan, job: str) -> Iterator[Problem]:
     """Yield what was conceded in a plan that verifies."""
     for event in plan.events:
-        if event.concedes:
-            place = Place(job, 0, 0) if event.move is None else plan.loaded.place_of_move(event.move)
-            text = event.text(plan.loaded.say)
-            yield Problem(text, place=place, kind=event.kind, severity="warning")
+        place = Place(job, 0, 0) if event.move is None else plan.loaded.place_of_move(event.move)
+        text = event.text(plan.loaded.say)
+        yield Problem(text, place=place, kind=event.kind, severity="warning")
