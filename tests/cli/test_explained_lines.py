@@ -34,6 +34,7 @@ def test_points_are_passed_at_times_of_the_move_or_unshifted_ones() -> None:
     ]
     assert through([waypoint(0.1 * k) for k in range(20)])[0].endswith("1.8, 1.9")
     assert through([waypoint(0.5 * k) for k in range(30)])[0].endswith("9, 9.5, ... 14.5")
+    assert through([waypoint(0.5 * k) for k in range(30)], 0.5)[1].endswith("8.5, 9, ... 14")
 
 
 def test_distances_at_which_points_are_missed_stand_by_joint_in_its_unit() -> None:
@@ -76,6 +77,8 @@ def test_peaks_have_the_times_of_their_move_and_the_share_of_the_limit_that_is_u
         "    a qdd: 3 (t = 0.25) deg; no limit",
         "    a qddd: 0 (t = 0.25) .. 7 (t = 0.5) deg; limits unlimited .. 14, 50 % used",
     ]
+    (line,) = peaks(peak("a", "velocity", -3, 3))
+    assert line == "    a qd: -3 (t = 0.25) .. 3 (t = 0.5) deg; no limit"
     (line,) = peaks(peak("a", "position", -math.pi, 0, unit="rad", limit=(-math.pi, math.pi)))
     assert line.startswith("    a q: -pi = -3.14159265 (t = 0.25) .. 0 (t = 0.5) rad; limits -pi .. pi")
 
@@ -88,6 +91,8 @@ def test_what_is_rounding_beside_the_largest_of_its_kind_is_not_told() -> None:
         assert len(peaks(*rates)) == 3 + told
         assert len(peaks(*rates, tool=object())) == 3 + fitted
     assert "    b q: 1 (t = 0.25) deg" in peaks(*rates)[2]
+    back = [peak("a", "velocity", -100, 0), peak("b", "velocity", -1e-11, 1e-11), peak("b", "position", 0, 0)]
+    assert [line.split(":")[0] for line in peaks(*back)] == ["    a qd", "    b q"]
     even = [peak("a", "velocity", 0, 100), peak("a", "acceleration", -1e-11, 1e-11)]
     assert len(peaks(*even, duration=1.0)) == 1
     assert len(peaks(*even, duration=100.0)) == 2

@@ -93,7 +93,12 @@ def test_the_worst_of_each_group_are_listed_and_the_others_counted() -> None:
         : 11 * 2
     ]
     every = [*certain, *rounding, *warnings]
-    for findings, listed in ((every, 30 + 4 + 4), (certain[:30], 30), (mixed, 11 + 4 + 4)):
+    for findings, listed in (
+        (every, 30 + 4 + 4),
+        (certain[:30], 30),
+        (certain[:31], 30),
+        (mixed, 11 + 4 + 4),
+    ):
         lines = list(check._lines(checked(*findings)))
         rows = [line for line in lines[2:] if cells(line)[0] in ("exceeded", "within rounding", "warning")]
         assert len(rows) == listed
@@ -106,9 +111,11 @@ def test_what_has_no_number_is_said_and_rules_and_hints_once_each() -> None:
         "time", value=None, limit=None, message="the time of {joint} is not finite", hint="mend it"
     )
     own = finding(rule="U1", hint="mend it")
-    lines = list(check._lines(checked(stamp, own, own, finding(), notes=("a note",))))
-    assert lines[-4:] == [
+    gap = finding("time", value=None, limit=None, rule="U2", message="there is a gap")
+    lines = list(check._lines(checked(stamp, gap, own, own, finding(), notes=("a note",))))
+    assert lines[-5:] == [
         "  the time of turn is not finite",
+        "  there is a gap",
         "  U1: the velocity of turn reaches 90 deg/s, its limit is 45 deg/s",
         "  mend it",
         "  a note",
@@ -205,8 +212,17 @@ def test_the_code_is_the_worst_of_all_files(names: str, form: str, capfd: Captur
     if form == "table":
         assert outcome.out.count("satisfied") == names.count("slow")
         assert outcome.out.count(".csv: exceeded") == names.count("fast")
+    if form == "github":
+        assert outcome.out.count("::error file=fast.csv") == names.count("fast")
     if form in ("table", "json"):
         assert outcome.err.count("error:") == names.count("broken") + names.count("none")
+
+
+@pytest.mark.usefixtures("folder")
+def test_strict_refuses_limits_that_are_looser_than_the_robots(capfd: Capture) -> None:
+    words = ("check", "slow.csv", "-r", "one.yaml", "--limits", "{velocity: 5}")
+    assert call(capfd, *words).code == 0
+    assert call(capfd, *words, "--strict").code == 1
 
 
 @pytest.mark.usefixtures("folder")

@@ -256,6 +256,10 @@ def test_an_arm_without_a_closed_form_goes_on_inside_its_ranges() -> None:
     solutions = solve(robot, partial_target(p[-1]), found[-2], 1e-9)
     every = solutions.joints[solutions.within_limits]
     assert np.abs(found[-1] - found[-2]).max() <= np.abs(every - found[-2]).max(axis=1).min() + 1e-6
+    stretched = forward(robot, np.array([[0.3, 0.01, 0.01]]))[:, :3, 3]
+    beyond = np.vstack([stretched, stretched * 0.9005 / np.linalg.norm(stretched)])  # half a millimetre
+    with pytest.raises(PlanningError, match="row 1"):
+        list(joints_of(arm, blocks("xyz", beyond), np.array([0.3, 0.01, 0.01]), 1e-6).blocks)
     far = np.vstack([p[:3], [[2.0, 0.0, 0.0]]])
     with pytest.raises(PlanningError, match="row 3"):
         list(joints_of(arm, blocks("xyz", far), q[0], 1e-9).blocks)
