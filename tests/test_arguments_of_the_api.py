@@ -192,3 +192,20 @@ def test_a_motion_of_arrays_is_judged_by_all_that_is_given() -> None:
         assert found.value == pytest.approx(limit - 0.001)
     asked = trajcli.check(*ends, limits={"velocity": 1.7}, interpolate="cubic", **still)
     assert asked.findings == ()
+
+
+def test_pages_are_packed_and_pictures_have_the_joints_that_are_asked_for(tmp_path: Path) -> None:
+    plan = trajcli.plan(SLIDE)
+    sizes = {}
+    for compress in (False, True):
+        trajcli.view(plan, tmp_path / "page.html", compress=compress)
+        sizes[compress] = (tmp_path / "page.html").stat().st_size
+    assert sizes[True] < 0.8 * sizes[False]
+    names = {}
+    for joints in ((), ("turn",), "slide"):
+        trajcli.plot(plan, tmp_path / "picture.svg", joints=joints, quantities="q")
+        names[joints] = {name for name in ("turn", "slide") if name in (tmp_path / "picture.svg").read_text()}
+    assert names[("turn",)] == {"turn"}
+    assert names["slide"] == {"slide"}
+    with pytest.raises(trajcli.InputError, match="a job names its own"):
+        trajcli.view(plan, tmp_path / "none.html", beside=plan, robot="ur5e")

@@ -11,7 +11,7 @@ import pytest
 from joined_by_scipy import largest_share
 from scipy.interpolate import BPoly
 
-from trajcli.errors import VerificationError
+from trajcli.errors import InputError, VerificationError
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.output.consumer import job_for
 from trajcli.output.delivery.delivered import delivered
@@ -177,3 +177,26 @@ def test_a_rule_that_slowness_keeps_is_refused_in_the_move_that_breaks_it(begins
     assert problem.place == loaded.place_of_move(1)
     assert problem.value == pytest.approx(speed, rel=1e-3)
     assert problem.time == pytest.approx(2.0 + turns[1][1] / 2, abs=0.02)
+
+
+def test_what_a_consumer_brings_goes_before_the_job_where_it_is_asked_for_and_behind_where_the_job_names_it() -> (
+    None
+):
+    ur = {"robot": "ur5e", "start": {"joints": [0] * 6}, "moves": [{"planner": "hold", "duration": 1}]}
+    asked, _, said = job_for(read(ur, times=[0, 0.5]), "ur-servoj", {})
+    output = asked.job.output
+    assert (output.times, output.rate, output.rows, output.align) == (None, 500, "rate", True)
+    assert said.endswith("that goes before `output` of the job")
+    named, _, said = job_for(read(ur, **{"for": "ur-passthrough"}), None, {})
+    assert (named.job.output.align, said) == (True, "")
+    other, _, said = job_for(read(ur, **{"for": "ur-servoj"}), "ur-passthrough", {})
+    assert (other.job.output.consumer, said) == ("ur-passthrough", "")
+    for own in ({"align": False}, {"times": [0, 0.5]}):
+        kept, _, _ = job_for(read(ur, **{"for": "ur-passthrough"}, **own), None, {})
+        assert not kept.job.output.align
+    text = json.dumps({**ONE, **ur, "output": {"for": "ur-servoj", "rate": 125}})
+    with pytest.raises(InputError, match="takes rows at 500 Hz, and 125 Hz is asked for") as refused:
+        job_for(job_from_text(text), None, {})
+    place = refused.value.problems[0].place
+    assert place is not None
+    assert text[place.column - 1 :].startswith("125")
