@@ -82,8 +82,8 @@ def _continue(
     which = np.flatnonzero(alone)
     before, after = far[which - 1], near[which + 1]
     from_left, from_right = np.abs(before - mean[which]), np.abs(after - mean[which])
-    least, most = np.minimum(from_left, from_right), np.maximum(from_left, from_right)
-    chosen = ~even[which] | (least <= _BESIDE * most)
+    least, larger = np.minimum(from_left, from_right), np.maximum(from_left, from_right)
+    chosen = ~even[which] | (least <= _BESIDE * larger)
     which, before, after = which[chosen], before[chosen], after[chosen]
     first = (from_left <= from_right)[chosen]
     near[which] = np.where(first, before, 2.0 * mean[which] - after)
@@ -107,9 +107,9 @@ def _believed(
     Where a row says it at one end only, it changes linearly to the other.
     """
     change = np.where(goes_on, np.abs(np.diff(mean)), 0.0)
-    most = _APART * np.maximum(np.append(0.0, change), np.append(change, 0.0))
+    limit = _APART * np.maximum(np.append(0.0, change), np.append(change, 0.0))
     with np.errstate(invalid="ignore"):
-        first, last = (np.where(np.abs(u - mean) <= most, u, np.nan) for u in (bound.near, bound.far))
+        first, last = (np.where(np.abs(u - mean) <= limit, u, np.nan) for u in (bound.near, bound.far))
     first, last = _filled(first, 2.0 * mean - last), _filled(last, 2.0 * mean - first)
     return _filled(first, near), _filled(last, far)
 
@@ -137,7 +137,7 @@ def binding_rows(rows: IntervalRows, x: Array) -> BindingRows:
             slack = (C - px - ry) / (_NEARLY * C + _ROUNDING * (np.abs(px) + np.abs(ry)))
         slack = np.where(
             np.isnan(slack), np.inf, np.round(slack, 4)
-        )  # of equals the first, whatever rounding says
+        )  # of equals the first, whatever rounding
         which, columns = slack.argmin(axis=0), np.arange(begin.size)
         source, owner = rows.sources[which], rows.owners[which]
         a0, b0, c0 = (each[:, block][source, columns] for each in rows.near)
