@@ -135,6 +135,11 @@ def test_a_stretch_keeps_the_limits_where_it_helps_against_all_that_is_certain()
     assert list(check._lines(checked(*some[2:])))[-1] != last
     up = list(check._lines(checked(finding(factor=1 + 1 / 3e6))))[-1]
     assert float(up.split()[-4]) >= 1 + 1 / 3e6  # rounded up: less would not be enough
+    row = cells(
+        list(check._lines(checked(finding(factor=1 + 1 / 3e6, value=0.0, amounts={}, message="none"))))[2]
+    )
+    assert row[3] == "0"
+    assert float(row[-1]) >= 1 + 1 / 3e6
 
 
 @pytest.mark.parametrize(

@@ -82,6 +82,8 @@ REFUSALS = [  # text, line, column, what is underlined, message, hint
     ("robot ur5e\nversion: 1\n", 1, 1, "robot ur5e", "'robot ur5e' has no colon", "`key: value`"),
     ("'a':1\n", 1, 4, ":", "no space after the colon", "`key: value`"),
     ("a: b: c\n", 1, 5, ":", "a second `key: value` in one line", "quotes"),
+    ("a:1:2\nb: 2\n", 1, 1, "a:1:2", "no space after the colon in 'a:1:2'", "write 'a: 1:2'"),
+    (f"{'x y' * 20}\nb: 2\n", 1, 1, "x y" * 20, f"'{('x y' * 20)[:40]}...' has no colon", "`key: value`"),
     ("a: 1\n  b: 2\n", 2, 3, "b", "the key 'b' stands too far right", "line 1 already has a value"),
     ("a:\n  b: 1\n c: 2\n", 3, 2, "c:", "begins in column 2, the keys before it in column 1", "align"),
     ("a:\n  - p: 1\n   t: 2\n", 3, 4, "t:", "no item of the list of column 3", "align"),
