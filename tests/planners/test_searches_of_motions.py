@@ -107,6 +107,40 @@ def test_what_several_findings_leave_is_the_least_of_each() -> None:
     assert not none.lowered
 
 
+def test_states_beside_a_lowered_zone_are_as_much_slower(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A path at pace p has speeds p and accelerations p^2; acceleration of joints at 0.81 is a pace of 0.9."""
+    search = search_of(with_shares(chain("lll"), np.ones((2, 3))))
+    states = np.arange(1.0, 13.0).reshape(6, 2)
+    monkeypatch.setattr(search, "_over", lambda states: [([], USED), ([], USED)])
+    assert not search._lowered(states)
+    assert search._near is None
+    assert search._changes is None
+    kept = iter([np.array([1.0, 0.81, 1.0]), np.ones(3)])
+    monkeypatch.setattr(search, "_kept_shares", lambda *given: next(kept))
+    assert search._lowered(states)
+    paces = np.array([1.0, 0.9, 0.9, 1.0, 1.0, 1.0])
+    np.testing.assert_allclose(search._near, states * np.column_stack([paces, paces**2]), rtol=1e-15)
+    np.testing.assert_allclose(search._changes, 1 - paces, atol=1e-15)
+
+
+def test_what_lasts_longer_than_is_known_is_not_searched_any_further(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By more than a thousandth, which is how rough the states may be."""
+    for durations, count in (((2.0, 2.0019, 2.0021, 3.0), 3), ((2.5, 3.0), 1)):
+        search = MotionSearch(CourseLaws(), within=2.0)
+        search.chain, given = chain("ll"), list[float]()
+
+        def found(*row: Any, twice: bool, durations: Any = durations, given: Any = given) -> Any:
+            for duration in durations[len(given) :]:
+                given.append(duration)
+                yield FoundStates(np.zeros((4, 2)), (duration,))
+
+        monkeypatch.setattr(motion_search, "_found", found)
+        monkeypatch.setattr(search, "_lowered", lambda states: True)
+        with pytest.raises(PlanningError, match="no motion"):
+            search.fastest(search.chain)
+        assert len(given) == count
+
+
 def test_each_zone_is_lowered_from_what_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     of = with_shares(chain("lll"), np.array([[0.5, 0.6, 0.7], [0.9, 0.8, 0.7]]))
     search = search_of(of)
@@ -408,7 +442,7 @@ def test_states_are_searched_until_no_zone_is_over_a_limit(monkeypatch: pytest.M
     durations = iter([2.0, 2.5, 2.25])
     rows, near = list[Any](), list[Any]()
 
-    def found(row: Any, ends: Any, states: Any, *, twice: bool) -> Any:
+    def found(row: Any, ends: Any, states: Any, changes: Any, *, twice: bool) -> Any:
         near.append(states)
         yield FoundStates(np.full((4, 2), len(near)), (next(durations),))
 

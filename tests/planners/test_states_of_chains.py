@@ -135,6 +135,17 @@ def test_one_joint_that_goes_straight_on_is_found_as_fast_as_without_zones(
     assert min(again.until().found().duration, math.inf) <= found.duration * (1 + 1e-9)
 
 
+def test_grids_around_states_that_were_hardly_changed_are_small() -> None:
+    """Five times the largest change in the window, from 0.002 to 0.05."""
+    nodes, parts = one_joint(*[0.2, 0.1] * 5, 0.2)
+    states = begin_search(nodes, parts, (REST[0], REST[0])).found().states
+    for first, last, sizes in ((0.0, 0.004, [0.002, 0.02]), (0.003, 0.5, [0.015, 0.05])):
+        changes = np.zeros(len(states))
+        changes[1], changes[-2] = first, last
+        begun = begin_search(nodes, parts, (REST[0], REST[0]), states, changes)
+        assert begun.sizes == pytest.approx(sizes)
+
+
 @pytest.mark.parametrize("moves", [3, 4])
 def test_windows_of_a_chain_begin_at_the_last_path_of_the_one_before(moves: int) -> None:
     for count in range(1, 60, 2):

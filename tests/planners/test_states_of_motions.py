@@ -26,6 +26,7 @@ def test_a_second_search_is_begun_where_it_looks_no_slower(
 
     def searched(self: MotionSearch, eased: np.ndarray, *, roughly: bool = False) -> Any:
         seen.append((self.chain, self._near, self._by_order, eased.tolist(), roughly))
+        assert self._within == pytest.approx(2.002)
         self._lowering = 9.0
         if expected is None:
             raise PlanningError("none")

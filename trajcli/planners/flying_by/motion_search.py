@@ -9,6 +9,7 @@ to what limits allow before any law is looked for.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -80,20 +81,23 @@ class MotionSearch:
         lowered: Whether a derivative of the joints was lowered in a zone for a limit of the tool.
     """
 
-    def __init__(self, laws: CourseLaws, *, by_order: bool = True) -> None:
+    def __init__(self, laws: CourseLaws, *, by_order: bool = True, within: float = math.inf) -> None:
         """Begin.
 
         Args:
             laws: Of courses, as far as they are known.
             by_order: Whether limits of the tool lower in zones the derivative of the joints that they are
                 about, else the pace.
+            within: Duration that is known without this search, s: what is expected to last longer is no use.
         """
         self.lowered, self._by_order = False, by_order
+        self._within = min(within * (1 + _ROUGH), sys.float_info.max)
         self.chain: FlyByChain
         self.model = math.inf
         self._paces: dict[int, float] = {}
         self._lowering = 0.0
         self._near: Array | None = None
+        self._changes: Array | None = None
         self._zones: dict[tuple[object, ...], tuple[list[Finding], Array]] = {}
         self._laws, self._stopping = laws, StoppingLaws(laws)
         self._motion: _Motion
@@ -109,8 +113,8 @@ class MotionSearch:
         best: list[FlownPart] | None = None
         for _ in range(_MOST):
             found, row = self._searched(eased)
-            if not math.isfinite(found.duration):
-                if best is None and self._stopping.slow_all(self.chain):
+            if found.duration > self._within:
+                if math.isinf(found.duration) and best is None and self._stopping.slow_all(self.chain):
                     continue
                 break
             try:
@@ -144,7 +148,7 @@ class MotionSearch:
             chain: That was searched, its zones not lowered.
             least: How long its motion lasts, s; infinite where there is none.
         """
-        other = MotionSearch(self._laws, by_order=False)
+        other = MotionSearch(self._laws, by_order=False, within=least)
         other.chain, other._near, other._zones = chain, self._near, self._zones
         try:
             expected = other._searched(self._eased(chain), roughly=True)[0].duration
@@ -254,8 +258,9 @@ class MotionSearch:
         paces = [self._pace(k) for k in range(len(self.chain.courses))]
         for turn in range(_LOWERINGS):
             row = row_of(self.chain, paces, eased.tolist(), self._stopping.states(self.chain))
-            for found in _found(row, self.chain.ends, self._near, twice=self.exact):
-                if not math.isfinite(found.duration):
+            changes, self._changes = self._changes, None
+            for found in _found(row, self.chain.ends, self._near, changes, twice=self.exact):
+                if found.duration > self._within:
                     return found, row
                 if self.exact:
                     self.model = min(self.model, found.duration)
@@ -270,13 +275,17 @@ class MotionSearch:
         return found, row
 
     def _lowered(self, states: Array) -> bool:
-        """Lower the pace of zones that are over a limit; return whether there was any."""
+        """Lower the pace of zones that are over a limit, and the states beside them; return whether any is."""
         if not self.chain.corners:
             return False
         shares = self.shares
         lowered = shares * [self._kept_shares(*each) for each in self._over(states)]
         self.chain = with_shares(self.chain, lowered)
-        return bool((lowered < shares).any())
+        if not (lowered < shares).any():
+            return False
+        paces = np.pad(np.repeat(((lowered / shares) ** (1 / POWERS)).min(axis=1), 2), 1, constant_values=1.0)
+        self._near, self._changes = states * paces[:, None] ** POWERS[:2], 1 - paces
+        return True
 
     def _kept_shares(self, findings: Sequence[Finding], used: Array) -> Array:
         """Return by what to lower velocity, acceleration and jerk of the joints, of which they use (3,)."""
@@ -331,18 +340,24 @@ def duration_of(parts: Sequence[FlownPart]) -> float:
 
 
 def _found(
-    row: ChainRow, ends: tuple[Array, Array], near: Array | None, *, twice: bool
+    row: ChainRow,
+    ends: tuple[Array, Array],
+    near: Array | None,
+    changes: Array | None = None,
+    *,
+    twice: bool,
 ) -> Iterator[FoundStates]:
     """Yield the states that are found for a row of nodes and parts, at last the fastest.
 
     Those of rough grids come before where paths bend: they show which zones are to be slower.
     """
-    forward = begin_search(row.nodes, row.parts, ends, near)
     if not twice:
+        forward = begin_search(row.nodes, row.parts, ends, near, changes)
         forward = forward.until(_ROUGH)
         yield forward.found()
         yield forward.until().found()
         return
+    forward = begin_search(row.nodes, row.parts, ends, near)
     mirror = np.array([1.0, -1.0])
     back, back_near = backwards(row), None if near is None else near[::-1] * mirror
     other = begin_search(back.nodes, back.parts, (ends[1] * mirror, ends[0] * mirror), back_near).until(

@@ -31,6 +31,7 @@ from trajcli.planners.flying_by.chain_parts import (
 _ROUNDS = 120
 _FIRST, _SMALLER, _FINEST = 0.2, 0.4, 3e-5  # sizes of grids around a chain, of the bounds of the speed
 _NEARBY = 0.05  # size of the first grids around the states of a chain that is much the same
+_WIDER, _NARROW = 5.0, 2e-3  # times what these states were changed by; the smallest of these grids
 _GOLDEN = math.pi * (3 - math.sqrt(5))  # by which grids are turned
 _GAIN = 1e-3  # of the grid's size, relative: what is less does not keep a grid from being halved
 _LOOKED_UP = 2000  # zones of one row of grids
@@ -150,6 +151,7 @@ def begin_search(
     parts: Sequence[ChainPart],
     ends: tuple[Array, Array],
     near: Array | None = None,
+    changes: Array | None = None,
 ) -> ChainSearch:
     """Return the search of the states at nodes for which a chain lasts least, with its first grid done.
 
@@ -158,20 +160,25 @@ def begin_search(
         parts: What lies between, before and behind them, k + 1.
         ends: The states (2,) at the start and at the end.
         near: States at all nodes of a chain that is much the same, (N, 2): the search begins there.
+        changes: By what these were changed, (N,), relative: near states of small changes is the best chain.
     """
     first, last = ends[0][None], ends[1][None]
-    windows = len(_windows(len(parts), _AT_ONCE))
-    steps = (None,) * windows
+    windows = _windows(len(parts), _AT_ONCE)
+    steps = (None,) * len(windows)
     if near is not None:
         inner = [node.inside(state[None]) for node, state in zip(nodes, near[1:-1], strict=True)]
         found = _fastest([first, *inner, last], parts)
         if math.isfinite(found.duration):
-            return ChainSearch(tuple(nodes), tuple(parts), found, (_NEARBY,) * windows, steps)
+            sizes = [_NEARBY] * len(windows)
+            if changes is not None:
+                largest = (float(changes[low : high + 1].max()) for low, high in windows)
+                sizes = [min(max(_WIDER * change, _NARROW), _NEARBY) for change in largest]
+            return ChainSearch(tuple(nodes), tuple(parts), found, tuple(sizes), steps)
     grids = [first, *(node.grid() for node in nodes), last]
     found = _by_windows(grids, nodes, parts)
     if not math.isfinite(found.duration):
         found = _fastest(_completed(grids, nodes, parts), parts)
-    return ChainSearch(tuple(nodes), tuple(parts), found, (_FIRST,) * windows, steps)
+    return ChainSearch(tuple(nodes), tuple(parts), found, (_FIRST,) * len(windows), steps)
 
 
 def _by_windows(grids: list[Array], nodes: Sequence[BorderNode], parts: Sequence[ChainPart]) -> FoundStates:

@@ -32,7 +32,7 @@ from trajcli.trajectory import State
 
 _ROUNDS = 40  # of lowering the pace of parts
 _SIZES = (1.0, 0.9, 0.7, 0.5, 0.3, 0.15)  # of a zone, for its borders
-_MORE = 1e-6  # beyond what is needed
+_MORE, _MUCH_MORE = 1e-6, 1e-2  # beyond what is needed, at first and at last
 _LESS = 0.8  # where nobody knows how much is needed
 _SLOWEST = 0.05  # slower parts are stopped at instead
 _PARALLEL = 1e-12  # relative: a direction that differs by less is the same
@@ -291,7 +291,7 @@ def _kept(
 ) -> tuple[FlyByChain, list[FlownPart]]:
     """Return the fastest chain that a search finds whose parts keep all limits and zones, and its parts."""
     sizes, shares, tempos = [0] * len(zones), np.ones((len(zones), 3)), np.ones(len(courses))
-    for _ in range(_ROUNDS):
+    for number in range(_ROUNDS):
         chain = chain_of(courses, zones, ends, [_SIZES[size] for size in sizes])
         chain = replace(with_shares(chain, shares), tempos=tuple(tempos.tolist()))
         straight = straightened(chain)
@@ -299,7 +299,8 @@ def _kept(
         shares[straight.corners] = search.shares
         chain = with_shares(chain, shares)
         parts = straight.parts(joined)
-        if not _lowered(chain, parts, sizes, shares, tempos):
+        more = min(_MORE * 4**number, _MUCH_MORE)
+        if not _lowered(chain, parts, (sizes, shares, tempos), more):
             return chain, straight.parts(search.bolder(joined))
         if min((shares ** (1 / POWERS)).min(), tempos.min()) < _SLOWEST:
             break
@@ -307,10 +308,10 @@ def _kept(
 
 
 def _lowered(
-    chain: FlyByChain, parts: Sequence[FlownPart], sizes: list[int], shares: Array, tempos: Array
+    chain: FlyByChain, parts: Sequence[FlownPart], kept: tuple[list[int], Array, Array], more: float
 ) -> bool:
-    """Lower the pace of parts that are over a limit, and the size of zones that are left."""
-    changed = False
+    """Lower the pace of parts that are over a limit, by a bit more, and the size of zones that are left."""
+    changed, (sizes, shares, tempos) = False, kept
     for number, part in enumerate(parts):
         findings = findings_of(chain, number, part)
         if not findings:
@@ -319,7 +320,7 @@ def _lowered(
         k, in_zone = divmod(number, 2)
         factors = [finding.factor for finding in findings if finding.factor is not None]
         if len(factors) == len(findings):
-            slower = 1 / (max(factors) * (1 + _MORE))
+            slower = 1 / (max(factors) * (1 + more))
         elif in_zone and sizes[k] + 1 < len(_SIZES):
             sizes[k] += 1
             continue
