@@ -508,3 +508,14 @@ def test_shares_of_zones_and_durations_of_motions() -> None:
     assert search_of(chain("ll")).exact
     assert not search_of(chain("lb")).exact
     assert not search_of(chain("bl")).exact
+
+
+def test_zones_that_use_more_than_their_shares_say_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bolder states may: the tool keeps its limits. What is not used leaves a share as it is, and all is one."""
+    search = search_of(with_shares(chain("lll"), np.array([[0.5, 0.6, 0.7], [0.98, 1.0, 0.5]])))
+    uses = iter(
+        [np.array([[1.02, 0.3], [0.9, 0.5], [0.2, 1.1]]), np.array([[1.1, 1.0], [0.5, 1.0], [0.9, 0.1]])]
+    )
+    monkeypatch.setattr(motion_search, "joint_uses", lambda curve, limits: next(uses))
+    search._raise_shares([SimpleNamespace(curve=None)] * 5)
+    np.testing.assert_allclose(search.shares, [[0.51, 0.6, 0.77], [1.0, 1.0, 0.5]], rtol=1e-12)

@@ -242,8 +242,16 @@ class MotionSearch:
             if any(findings_of(self.chain, k, part) for k, part in enumerate(other)):
                 break
             parts = other
+            self._raise_shares(parts)
         self.model = min(self.model, duration_of(parts) - self._motion.lowering)
         return parts
+
+    def _raise_shares(self, parts: Sequence[FlownPart]) -> None:
+        """Raise the shares of zones that use more of their joints' limits: limits of the tool allow it."""
+        shares = self.shares
+        for k, (part, corner) in enumerate(zip(parts[1::2], self.chain.corners, strict=False)):
+            shares[k] *= np.maximum(joint_uses(part.curve, corner.limits).max(axis=1), 1.0)
+        self.chain = with_shares(self.chain, np.minimum(shares, 1.0))
 
     def _adapted(self, changes: Array) -> float:
         """Change the paces of bent courses by factors (k,); return the largest change, relative."""
@@ -275,7 +283,7 @@ class MotionSearch:
         return found, row
 
     def _lowered(self, states: Array) -> bool:
-        """Lower the pace of zones that are over a limit, and the states beside them; return whether any is."""
+        """Lower the pace of zones that are over a limit, and the states beside them; return if any is."""
         if not self.chain.corners:
             return False
         shares = self.shares

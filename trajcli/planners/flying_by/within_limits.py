@@ -301,7 +301,9 @@ def _kept(
         parts = straight.parts(joined)
         more = min(_MORE * 4**number, _MUCH_MORE)
         if not _lowered(chain, parts, (sizes, shares, tempos), more):
-            return chain, straight.parts(search.bolder(joined))
+            parts = straight.parts(search.bolder(joined))
+            shares[straight.corners] = search.shares
+            return with_shares(chain, shares), parts
         if min((shares ** (1 / POWERS)).min(), tempos.min()) < _SLOWEST:
             break
     raise PlanningError("no motion through its zones keeps all limits")
