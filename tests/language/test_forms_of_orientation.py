@@ -163,3 +163,23 @@ def test_a_matrix_that_is_off_a_rotation_is_noted_wherever_its_pose_is_given(hea
     assert "off a rotation" not in str([*exact.events, *exact.remarks])
     ends = [each.trajectory.curve.evaluate(each.trajectory.duration, side="left") for each in (plan, exact)]
     assert 1e-6 < np.abs(ends[0] - ends[1]).max() < 2e-4
+
+
+@pytest.mark.parametrize(
+    ("pose", "wrong"),
+    [
+        ("{xyz: [a, 1, b], rpy: [c, 0, d]}", "a b c d"),
+        ("{xyz: [0, 1, b], axis_angle: {axis: [1, q, 0], angle: r}}", "b q r"),
+        ("{matrix: [[1, a, 0], [0, b, 0], [0]]}", "a b [0]"),
+        ("{matrix: [[1, 0, 0, a], [0, 1, 0, 0], [0, 0, b, 0], [0, 0, 0, 1mm]]}", "a b 1mm"),
+    ],
+)
+def test_every_flaw_of_a_pose_is_said_at_once_where_it_stands(pose: str, wrong: str) -> None:
+    for key in ("tool", "base", "point"):
+        text = f"  p: {pose}\n" if key == "point" else f"{key}: {pose}\n"
+        with pytest.raises(InputError) as refused:
+            job_with(*((text, "") if key == "point" else ("  p: {joints: 0}\n", text)))
+        places = [problem.place for problem in refused.value.problems]
+        assert all(place is not None and place.source.strip() == text.strip() for place in places)
+        said = [place.source[place.column - 1 :][: place.length] for place in places if place is not None]
+        assert said == wrong.split()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import numpy as np
@@ -27,6 +28,7 @@ from trajcli.language.numbers import (
     shown,
     written_number,
 )
+from trajcli.language.per_joint import read_each
 from trajcli.units import Quantity
 
 if TYPE_CHECKING:
@@ -131,20 +133,23 @@ def _object(properties: Mapping[str, Any], description: str, *required: str) -> 
 
 
 def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -> Array:
+    def read(key: str, item: Any) -> Array:  # noqa: ANN401
+        try:
+            return _READERS[key](item, context)
+        except InputError as error:
+            raise FlawError(str(error), hint=error.problems[0].hint) from None
+
+    fields = read_each(((key, value[key]) for key in (form, "xyz") if key is not None and key in value), read)
     pose = np.eye(4)
     if form is not None:
-        try:
-            with flaws_below(form):
-                read = _READERS[form](value[form], context)
-        except InputError as error:
-            raise FlawError(str(error), form, hint=error.problems[0].hint) from None
-        if len(read) == 4 and "xyz" in value:
+        size = len(fields[form])
+        if size == 4 and "xyz" in value:
             raise FlawError(
                 "a 4x4 matrix already has a position", "xyz", hint="leave xyz out, or give a 3x3 matrix"
             )
-        pose[: len(read), : len(read)] = read
+        pose[:size, :size] = fields[form]
     if "xyz" in value:
-        pose[:3, 3] = read_numbers(value["xyz"], 3, _LENGTH, context, "xyz")
+        pose[:3, 3] = fields["xyz"]
     return pose
 
 
@@ -154,17 +159,14 @@ def read_numbers(
     """Return `count` numbers of one quantity in SI, shape (count,).
 
     Raises:
-        FlawError: Names the first that does not fit.
+        FlawError: Names each that does not fit.
     """
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != count:
         got = f"{len(value)} values" if isinstance(value, list) else shown(value)
         raise FlawError(f"expected {count} numbers, got {got}", *path)
-    numbers = np.empty(count)
-    for index, item in enumerate(value):
-        try:
-            numbers[index] = read_number(item, quantity, context.units)
-        except FlawError as error:
-            raise FlawError(str(error), *path, index, hint=error.flaws[0][2]) from None
+    with flaws_below(*path):
+        read = read_each(enumerate(value), lambda _, item: read_number(item, quantity, context.units))
+    numbers = np.array([*read.values()])
     if quantity == _ANGLE and context.units.angle == "rad" and max(abs(numbers)) > TWO_TURNS:
         context.has_far_angle = True
     return numbers
@@ -174,22 +176,23 @@ def read_rows(value: Any, context: ReadingContext) -> tuple[tuple[float, ...], .
     """Return the rows of a 3x3 or 4x4 matrix, the position in m.
 
     Raises:
-        FlawError: Names the first entry that does not fit.
+        FlawError: Names each entry that does not fit.
     """
     if not isinstance(value, list | tuple) or len(value) not in (3, 4):
         got = f"{len(value)} rows" if isinstance(value, list) else shown(value)
         raise FlawError(f"expected a 3x3 or 4x4 matrix, row by row, got {got}")
-    rows, size = [], len(value)
-    for index, row in enumerate(value):
+    context.has_matrix, size = True, len(value)
+
+    def entry(index: int, column: int, item: Any) -> float:  # noqa: ANN401
+        return read_number(item, _LENGTH if column == 3 != index else _RATIO, context.units)
+
+    def row_of(index: int, row: Any) -> tuple[float, ...]:  # noqa: ANN401
         if not isinstance(row, list | tuple) or len(row) != size:
             got = f"{len(row)} values" if isinstance(row, list) else shown(row)
-            raise FlawError(f"expected a row of {size} numbers, got {got}", index)
-        numbers = read_numbers(row[:3], 3, _RATIO, context, index).tolist()
-        with flaws_below(index, 3):
-            last = _RATIO if index == 3 else _LENGTH
-            rows.append((*numbers, *(read_number(item, last, context.units) for item in row[3:])))
-    context.has_matrix = True
-    return tuple(rows)
+            raise FlawError(f"expected a row of {size} numbers, got {got}")
+        return tuple(read_each(enumerate(row), partial(entry, index)).values())
+
+    return tuple(read_each(enumerate(value), row_of).values())
 
 
 def _matrix(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
@@ -207,6 +210,10 @@ def _projected(matrix: Array) -> Array:
     check_rotation(matrix)
     off = np.abs(matrix @ matrix.T - np.eye(3)).max()
     return matrix if off <= _ROUNDING else nearest_rotation(matrix)
+
+
+def _position(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
+    return read_numbers(value, 3, _LENGTH, context)
 
 
 def _rpy(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
@@ -241,9 +248,11 @@ def _rotation_vector(value: Any, context: ReadingContext) -> Array:  # noqa: ANN
 def _axis_angle(value: Any, context: ReadingContext) -> Array:  # noqa: ANN401
     from trajcli.geometry.rotation import matrix_from_axis_angle
 
-    fields = _exactly(value, ("axis", "angle"), ())
-    axis = read_axis(fields["axis"], context, "axis")
-    return matrix_from_axis_angle(axis, read_numbers([fields["angle"]], 1, _ANGLE, context, "angle")[0])
+    def read(key: str, item: Any) -> Array:  # noqa: ANN401
+        return read_axis(item, context) if key == "axis" else read_numbers([item], 1, _ANGLE, context)
+
+    fields = read_each(_exactly(value, ("axis", "angle"), ()).items(), read)
+    return matrix_from_axis_angle(fields["axis"], fields["angle"][0])
 
 
 def read_axis(value: Any, context: ReadingContext, *path: str) -> Array:  # noqa: ANN401
@@ -299,6 +308,7 @@ def _exactly(value: Any, needed: tuple[str, ...], optional: tuple[str, ...]) -> 
 
 
 _READERS = {
+    "xyz": _position,
     "rpy": _rpy,
     "quat_wxyz": _quaternion,
     "quat_xyzw": _quaternion_w_last,
