@@ -209,3 +209,15 @@ def test_pages_are_packed_and_pictures_have_the_joints_that_are_asked_for(tmp_pa
     assert names["slide"] == {"slide"}
     with pytest.raises(trajcli.InputError, match="a job names its own"):
         trajcli.view(plan, tmp_path / "none.html", beside=plan, robot="ur5e")
+
+
+@pytest.mark.parametrize("given", ["x", None, [1.0], True])
+def test_what_is_no_number_is_refused_by_name(given: Any) -> None:
+    arm = trajcli.load_robot("ur5e")
+    pose = arm.fk([0, -1, 1, 0, 1, 0])
+    with pytest.raises(trajcli.InputError, match="tolerance: expected a number, got"):
+        arm.ik(pose, tolerance=given)
+    with pytest.raises(trajcli.InputError, match="rate: expected a number, got"):
+        trajcli.plan(SLIDE).trajectory.sample(given)
+    assert arm.ik(pose, tolerance=np.float32(1e-6))
+    assert len(trajcli.plan(SLIDE).trajectory.sample(np.int64(2)).t) == 7

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, numeric, read_only
+from trajcli.curves.piecewise import Array, PiecewisePolynomial, numeric, read_only, real_number
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import AT_BREAK, NANOSECOND, UniformGrid, onto_breaks
@@ -362,7 +362,7 @@ class Trajectory:
         Raises:
             InputError: When the rate is not above 0, or so high that times would be equal.
         """
-        parts = list(UniformGrid(self.duration, rate, self.start_time).blocks())
+        parts = list(UniformGrid(self.duration, real_number(rate, "rate"), self.start_time).blocks())
         local = onto_breaks(np.concatenate([part for _, part in parts]), self.curve.breaks)
         states = self.curve.evaluate_orders(local, (0, 1, 2))
         return Rows(np.concatenate([times for times, _ in parts]), *(states[:, k] for k in range(3)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajcli.curves.piecewise import Array, numeric
+from trajcli.curves.piecewise import Array, numeric, real_number
 from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob, job_from_text, load_job
@@ -138,7 +138,8 @@ class Arm(Robot):
             tolerance: What an answer may miss the pose by, m and rad.
 
         Raises:
-            InputError: When the robot has no geometry, the pose is none, or `near` is no configuration.
+            InputError: When the robot has no geometry, the pose is none, or `near` is no configuration, or the
+                tolerance no number above 0.
         """
         from trajcli.kinematics.inverse.solve import solve
         from trajcli.kinematics.inverse.target import pose_target
@@ -146,7 +147,7 @@ class Arm(Robot):
         aim = np.zeros(len(self.joints)) if near is None else np.asarray(numeric(near, "near"), np.float64)
         if aim.ndim != 1:
             raise InputError(f"near: expected the values of {len(self.joints)} joints, got shape {aim.shape}")
-        solutions = solve(self, pose_target(_pose(pose)), aim, tolerance)
+        solutions = solve(self, pose_target(_pose(pose)), aim, real_number(tolerance, "tolerance"))
         usable = np.flatnonzero(solutions.valid if every else solutions.within_limits)
         usable = usable[np.argsort(np.abs(solutions.joints[usable] - aim).max(axis=-1), kind="stable")]
         return tuple(

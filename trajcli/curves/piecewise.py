@@ -56,6 +56,17 @@ def numeric(values: ArrayLike, name: str) -> NDArray[Any]:
     return array
 
 
+def real_number(value: object, name: str) -> float:
+    """Return what a user has given as a number.
+
+    Raises:
+        InputError: When it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        raise InputError(f"{name}: expected a number, got {value!r:.40}")
+    return float(value)
+
+
 @frozen
 class PiecewisePolynomial:
     """A function of one variable with values in R^n, a polynomial between neighbouring breaks.
