@@ -138,8 +138,8 @@ class Arm(Robot):
             tolerance: What an answer may miss the pose by, m and rad.
 
         Raises:
-            InputError: When the robot has no geometry, the pose is none, or `near` is no configuration, or the
-                tolerance no number above 0.
+            InputError: When the robot has no geometry, the pose is none, `near` is no configuration, or the
+                tolerance is no number above 0.
         """
         from trajcli.kinematics.inverse.solve import solve
         from trajcli.kinematics.inverse.target import pose_target
