@@ -144,6 +144,10 @@ def test_grids_around_states_that_were_hardly_changed_are_small() -> None:
         changes[1], changes[-2] = first, last
         begun = begin_search(nodes, parts, (REST[0], REST[0]), states, changes)
         assert begun.sizes == pytest.approx(sizes)
+    for node, sizes in ((0, [0.02, 0.002]), (6, [0.02, 0.02]), (7, [0.02, 0.02]), (8, [0.002, 0.02])):
+        changes = 0.004 * (np.arange(len(states)) == node)
+        begun = begin_search(nodes, parts, (REST[0], REST[0]), states, changes)
+        assert begun.sizes == pytest.approx(sizes), "its ends count, too"
 
 
 @pytest.mark.parametrize("moves", [3, 4])

@@ -58,6 +58,8 @@ def boldly(
         return lasting(durations[len(tried) - 1])
 
     monkeypatch.setattr(motion_search, "flown_parts", made)
+    raised = fields.get("raised", list[float]())
+    monkeypatch.setattr(search, "_raise_shares", lambda parts: raised.append(parts[0].curve.duration))
     monkeypatch.setattr(search, "_over", lambda states: [(fields.get("zones", {}).get(len(tried), []), USED)])
     monkeypatch.setattr(
         motion_search, "findings_of", lambda chain, k, part: fields.get("parts", {}).get(len(tried), [])
@@ -70,6 +72,8 @@ def test_bolder_states_are_tried_as_long_as_they_are_faster(monkeypatch: pytest.
     found, tried, search = boldly(monkeypatch, [1.9, 1.8])
     assert (found, len(tried)) == ([1.8], 3)
     assert search.model == 1.8 - 0.125
+    boldly(monkeypatch, [1.9, 1.8, 1.85], raised=(raised := list[float]()))
+    assert raised == [1.9, 1.8], "of motions that are taken"
     for turn, ratios in enumerate(tried, 1):
         want = np.ones((6, 2))
         want[2:5] = [1.01**turn, 1.06**turn]  # not of the line, nor the end of the chain

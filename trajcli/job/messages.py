@@ -394,7 +394,7 @@ def matrices_off_rotation(document: Document) -> Iterator[Event]:
             rows = read_rows(node.plain(), ReadingContext())
             defect = check_rotation(np.array([row[:3] for row in rows[:3]]))
             if defect > _NOTED:
-                move = path[1] if path[0] == "moves" and isinstance(path[1], int) else None
+                move = path[1] if isinstance(path[1], int) else None  # `moves` is the one list at the top
                 where = ".".join(map(str, path if move is None else path[2:]))
                 text = f"the matrix {where} is off a rotation by {defect:.3g}: the nearest one is taken"
                 yield Event("nearest_rotation", text, move)
