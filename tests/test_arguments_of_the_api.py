@@ -221,3 +221,17 @@ def test_what_is_no_number_is_refused_by_name(given: Any) -> None:
         trajcli.plan(SLIDE).trajectory.sample(given)
     assert arm.ik(pose, tolerance=np.float32(1e-6))
     assert len(trajcli.plan(SLIDE).trajectory.sample(np.int64(2)).t) == 7
+
+
+@pytest.mark.parametrize("off", [5e-6, 1e-9])
+def test_a_pose_that_is_off_a_rotation_means_the_nearest_one(off: float) -> None:
+    """The polar factor, by the square root of R^T R; answers reach it, not what is off."""
+    arm = trajcli.load_robot("ur5e")
+    pose = arm.fk([0.3, -1, 1, 0.2, 1, 0.1])
+    pose[:3, :3] += off * np.array([[0, 1, 0.5], [0.2, 0, 0], [0, 0.3, 0.7]])
+    values, vectors = np.linalg.eigh(pose[:3, :3].T @ pose[:3, :3])
+    nearest = pose[:3, :3] @ vectors @ np.diag(values**-0.5) @ vectors.T
+    answers = arm.ik(pose)
+    assert answers
+    for answer in answers:
+        np.testing.assert_allclose(arm.fk(answer.joints)[:3, :3], nearest, atol=0.05 * off, rtol=0)
