@@ -521,3 +521,13 @@ def test_a_path_that_bends_where_joints_start_in_motion_is_flown_where_their_jer
         assert not within_limits._rates_along(course, resting(POINTS[0])).any()
     else:
         np.testing.assert_allclose(within_limits._rates_along(course, start), [0.5, 0.0])
+
+
+def test_a_chain_says_what_bolder_states_use_of_its_zones(monkeypatch: pytest.MonkeyPatch) -> None:
+    def bolder(self: Search, parts: list[FlownPart]) -> list[FlownPart]:
+        self.shares = np.array([[0.75, 0.5, 0.25]])
+        return parts
+
+    monkeypatch.setattr(Search, "bolder", bolder)
+    _, _, chain, _ = kept(monkeypatch, {})
+    assert chain.corners[0].shares == (0.75, 0.5, 0.25)
