@@ -135,9 +135,8 @@ def binding_rows(rows: IntervalRows, x: Array) -> BindingRows:
         C, px, ry = rows.C[:, block], rows.P[:, block] * begin, rows.R[:, block] * end
         with np.errstate(divide="ignore", invalid="ignore"):
             slack = (C - px - ry) / (_NEARLY * C + _ROUNDING * (np.abs(px) + np.abs(ry)))
-        slack = np.where(
-            np.isnan(slack), np.inf, np.round(slack, 4)
-        )  # of equals the first, whatever rounding
+        # of equals the first, whatever rounding says
+        slack = np.where(np.isnan(slack), np.inf, np.round(slack, 4))
         which, columns = slack.argmin(axis=0), np.arange(begin.size)
         source, owner = rows.sources[which], rows.owners[which]
         a0, b0, c0 = (each[:, block][source, columns] for each in rows.near)
