@@ -147,6 +147,28 @@ def test_a_scheduler_that_is_not_there(
 
 
 @pytest.mark.usefixtures("folder")
+def test_a_cluster_without_workers_is_one_error(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    require_module("distributed")
+    from distributed import LocalCluster
+
+    monkeypatch.setattr("trajcli.batches.cluster._CONNECTING", 1.0)
+    with LocalCluster(n_workers=0, dashboard_address=None) as empty:
+        address = empty.scheduler_address
+        words = ("--engine", "dask", "--scheduler", address)
+        for command in (["batch", "jobs"], ["sweep", "jobs/a.yaml", "--vary", "moves.0.duration=1,2"]):
+            capfd.readouterr()
+            with pytest.raises(SystemExit, match=r"^4$"):
+                app([*command, *words])
+            out, err = capfd.readouterr()
+            assert out == ""
+            assert f"error: the scheduler {address} has no workers" in err
+            assert f"`dask worker {address}` starts one" in err
+            assert "standard output" not in err
+
+
+@pytest.mark.usefixtures("folder")
 def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("distributed.py").write_text("raise ImportError")
     monkeypatch.setenv("PYTHONPATH", str(Path.cwd()), prepend=os.pathsep)

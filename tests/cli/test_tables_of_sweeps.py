@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+import json
+import random
 from pathlib import Path
 
 import pytest
 from running import JOB, call
+
+from trajcli.batches.jobs import BatchJob
+from trajcli.batches.task import JobOutcome, SweepPoint
+from trajcli.errors import Problem
 
 Capture = pytest.CaptureFixture[str]
 
@@ -49,6 +55,8 @@ def test_rows_are_all_combinations_in_order_and_the_code_is_that_of_strict(
         "  exceeded at moves.0.duration=0.5, moves.0.to.joints=[30]",
         "  input at moves.0.duration=0, moves.0.to.joints=[10]",
     ]
+    assert "the velocity of j1 reaches 112.5 deg/s" in lines[0]
+    assert "112.5" not in lines[1]
     assert call(capfd, *words, "--strict", "-q") == (1, out, "")
 
 
@@ -95,6 +103,11 @@ def test_points_are_drawn_by_the_seed(capfd: Capture) -> None:
     ]
     assert [len(rows_of(table)) for table in tables] == [3] * 4
     assert tables[0] == tables[1] != tables[2] == tables[3]
+    for seed, table in ((0, tables[0]), (7, tables[2])):  # one of each third, by Python's generator
+        chance = random.Random(seed)
+        drawn = [chance.randrange(part * 1000 // 3, (part + 1) * 1000 // 3) for part in range(3)]
+        found = [float(row["moves.0.duration"]) for row in rows_of(table)]
+        assert found == pytest.approx([1 + number / 999 for number in drawn], rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -133,3 +146,35 @@ def test_points_that_take_too_long_are_no_rows_and_have_their_code(
     assert outcome.code == 3
     assert rows_of(outcome.out) == []
     assert outcome.err.count("it was not done within 5 s") == 2
+
+
+def test_all_that_is_wrong_with_a_point_without_a_row_is_said_in_the_form_that_is_asked_for(
+    capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problems = (Problem("the rail is bent"), Problem("the oil is cold"))
+    failed = JobOutcome(BatchJob("job.yaml", "0"), "crashed", 70, problems)
+    done = JobOutcome(BatchJob("job.yaml", "1"), "written", point=SweepPoint("verified", 2.0))
+    monkeypatch.setattr(
+        "trajcli.cli.sweep.outcomes_of", lambda *_: (each for each in [(0, failed), (1, done)])
+    )
+    words = ("sweep", "job.yaml", "--vary", "moves.0.duration=1,2", "-q")
+    said = call(capfd, *words)
+    assert (said.code, [row["moves.0.duration"] for row in rows_of(said.out)]) == (70, ["2"])
+    assert said.err == "error: the rail is bent\nerror: the oil is cold\n"
+    (line,) = call(capfd, *words, "--errors", "json").err.splitlines()
+    assert [each["message"] for each in json.loads(line)["problems"]] == [
+        "the rail is bent",
+        "the oil is cold",
+    ]
+
+
+def test_one_row_is_a_row(capfd: Capture) -> None:
+    outcome = call(capfd, "sweep", "job.yaml", "--vary", "moves.0.duration=1", "-j", "1")
+    assert (outcome.code, len(rows_of(outcome.out))) == (0, 1)
+    assert outcome.err.startswith("1 row: 1 verified, ")
+
+
+def test_a_job_from_standard_input_is_called_so(capfd: Capture) -> None:
+    outcome = call(capfd, "sweep", "-", "--vary", "moves.0.duration=1,2", stdin=JOB + "name: [\n")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err.startswith("<stdin>:")

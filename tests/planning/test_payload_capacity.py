@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from decimal import ROUND_DOWN, Decimal
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from trajcli.errors import InputError, TrajcliError, VerificationError
 from trajcli.job.read import job_from_text
 from trajcli.planning import plan as plan_module
 from trajcli.planning import planned_move
-from trajcli.planning.payload_capacity import payload_capacity
+from trajcli.planning.payload_capacity import PayloadCapacity, payload_capacity
 from trajcli.planning.plan import plan_job
 
 HEAD = """
@@ -292,6 +293,24 @@ def test_the_command_for_people_and_programs(tmp_path, capsys) -> None:  # type:
     assert 0 < told["mass"] - shown < 1e-4 * told["mass"] or shown == pytest.approx(told["mass"], rel=1e-5)
     assert shown <= told["mass"]
     assert f"with more, {told['joint']} needs" in second
+
+
+@pytest.mark.parametrize("mass", [2.5, 9.123456, 1.000006, 0.99999951, 123.456499, 31.415926535])
+def test_the_mass_that_is_shown_is_the_largest_of_six_digits_that_verifies(
+    mass: float, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = tmp_path / "job.yaml"
+    job.write_text(CARRYING.replace("MASS", "0.5"))
+    found = PayloadCapacity(mass, None, (2,), cause="it slips")
+    monkeypatch.setattr("trajcli.cli.payload.payload_capacity", lambda *_: found)
+    assert run_payload(PayloadCommand(job=str(job))) == 0
+    shown = capsys.readouterr().out.splitlines()[0].rsplit(" ", 2)[1]
+    exact = Decimal(repr(mass))
+    assert Decimal(shown) == round_down(exact, exact.adjusted() - 5)
+
+
+def round_down(value: Decimal, exponent: int) -> Decimal:
+    return value.quantize(Decimal(1).scaleb(exponent), ROUND_DOWN)
 
 
 def test_a_job_for_a_consumer_must_give_it_rows_with_any_mass(

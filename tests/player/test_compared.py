@@ -118,3 +118,15 @@ def test_diff_writes_a_page_of_both(folder: Path, capfd: pytest.CaptureFixture[s
     assert (alone.code, "add --view FILE.html" in alone.err) == (2, True)
     many = call(capfd, "diff", "rows.csv", "late.csv", ".", "--view", "both.html")
     assert (many.code, "--view is of two files" in many.err) == (2, True)
+
+
+@pytest.mark.parametrize("name", ["-", "both.txt", "rows.csv"])
+def test_a_page_beside_what_differs_is_a_file_of_html(
+    name: str, folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Standard output has what differs, and nothing is said before the name of the page is known to do."""
+    before = (folder / "rows.csv").read_text()
+    refused = call(capfd, "diff", "rows.csv", "late.csv", "--view", name)
+    assert (refused.code, refused.out) == (2, "")
+    assert f"a page is HTML, and '{name}' is the name of something else" in refused.err
+    assert (folder / "rows.csv").read_text() == before

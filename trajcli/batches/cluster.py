@@ -36,12 +36,12 @@ def run_on_cluster(
 
     Raises:
         InputError: When Dask is not installed, or nothing says where the scheduler is.
-        FileError: When the scheduler cannot be reached.
+        FileError: When the scheduler cannot be reached, or has no workers.
     """
     client, as_completed = _client(address)
     futures: dict[Any, Task] = {}
     try:
-        shared = client.scatter(setup, broadcast=True)
+        shared = _scattered(client, setup)
         for task in tasks:
             futures[client.submit(_run_on_worker, _absolute(task), shared, pure=False)] = task
         for future in as_completed(list(futures), loop=client.loop):
@@ -64,13 +64,24 @@ def _client(address: str | None) -> tuple[Any, Any]:
     if address is None:
         hint = "name it with --scheduler, such as tcp://10.0.0.5:8786, or in DASK_SCHEDULER_ADDRESS"
         raise InputError("the engine dask needs the address of a scheduler", hint=hint)
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is in the outcomes
+    for name in ("distributed", "distributed.client"):  # what goes wrong is in the outcomes
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         connect: Any = distributed.Client
         return connect(address, timeout=_CONNECTING, set_as_default=False), distributed.as_completed
     except (OSError, ValueError, TypeError) as error:
         message = f"the scheduler {address} cannot be reached: {error or type(error).__name__}"
         raise FileError(message, hint="`dask scheduler` prints its address") from None
+
+
+def _scattered(client: Any, setup: Setup) -> Any:  # noqa: ANN401
+    """Return what all tasks share as the workers have it."""
+    try:
+        return client.scatter(setup, broadcast=True)
+    except OSError as error:
+        address = client.scheduler.address
+        hint = f"`dask worker {address}` starts one"
+        raise FileError(f"the scheduler {address} has no workers: {error}", hint=hint) from None
 
 
 def _absolute(task: Task) -> Task:

@@ -62,6 +62,9 @@ def _check_view(options: DiffCommand, *, alone: bool) -> None:
         return
     if not alone or "-" in options.files:
         raise InputError("--view is of two files", hint="name two files, and neither as -")
+    from trajcli.player.page import check_page_name
+
+    check_page_name(options.view)  # standard output takes what differs
 
 
 def _compared(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from trajcli.cli.numbers import numbers
 from trajcli.cli.outcome import print_json, print_lines
 from trajcli.cli.progress import progress
+from trajcli.errors import Amount
 from trajcli.job.read import LoadedJob, load_job
 from trajcli.planning.payload_capacity import PayloadCapacity, payload_capacity
 from trajcli.units import Quantity, effort_unit, to_user
@@ -49,7 +50,8 @@ def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
     if capacity.mass is None:
         yield f"any mass {where} will do in {moves}"
         return
-    yield f"largest mass {where} in {moves}: {_rounded_down(capacity.mass)} kg"
+    mass = Amount(capacity.mass, rounded="down", digits=6)  # one that verifies
+    yield f"largest mass {where} in {moves}: {mass} kg"
     if capacity.joint is None or capacity.effort is None:
         yield f"  with more, {capacity.cause}"
         return
@@ -58,9 +60,3 @@ def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
     limit = "" if capacity.limit is None else f", its limit is {capacity.limit:.9g} {unit}"
     needed = f"{capacity.joint} needs {capacity.effort:.6g} {unit}"
     yield f"  with more, {needed} in move {capacity.move}{when}{limit}"
-
-
-def _rounded_down(mass: float) -> str:
-    """Return a mass with six digits that verifies."""
-    shown = f"{mass:.6g}"
-    return shown if float(shown) <= mass else f"{mass - 0.5 * 10 ** (-5) * mass:.6g}"

@@ -55,10 +55,9 @@ def write_comparison(first: str, second: str, output: str, robot: str | None) ->
     """Write the page of two files of rows, judged by the limits of an arm where one is named.
 
     Raises:
-        InputError: When they do not fit each other, the arm, or what a page is called.
+        InputError: When they do not fit each other, or the arm.
         FileError: When one cannot be read, or the page not be written.
     """
-    _check_output(output)
     shown = [_shown_file(name, robot, output, BUDGET) for name in (first, second)]
     page = page_of(scene_of_two(*(one.scene for one in shown)))
     _write(page, output)
