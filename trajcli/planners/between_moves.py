@@ -114,13 +114,11 @@ class ChangeTool(BetweenMoves):
         """
         if start.velocity.any():
             joint = int(np.abs(start.velocity).argmax())
-            amounts: Amounts = {
-                "joint": robot.joint_names[joint],
-                "velocity": Amount(float(start.velocity[joint]), 1, joint),
-            }
+            name, velocity = robot.joint_names[joint], Amount(float(start.velocity[joint]), 1, joint)
+            amounts: Amounts = {"joint": name, "velocity": velocity}
             message = "a tool is changed where the arm stands, and {joint} moves with {velocity}"
             hint = "end the move before it at rest: leave `velocity` out of its target"
-            raise PlanningError(Problem(message, hint, amounts=amounts))
+            raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
         return super().plan(start, robot)
 
 

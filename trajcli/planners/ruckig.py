@@ -262,8 +262,8 @@ def _double_s(problem: BoundaryProblem, duration: float | None) -> PhaseProfile 
     if min(lengths) < _SHORT * max(lengths):
         return None
     cruise = frozenset([len(lengths) // 2]) if found.cruising else frozenset[int]()
-    final, rest = (displacement, 0.0, 0.0), (0.0, 0.0, 0.0)
-    chain = PhaseChain(rest, final, tuple(lengths), tuple(constants), cruise)
+    final, still = (displacement, 0.0, 0.0), (0.0, 0.0, 0.0)
+    chain = PhaseChain(still, final, tuple(lengths), tuple(constants), cruise)
     profile = PhaseProfile(problem.initial[0], chain, chain.duration)
     if duration is not None and duration < profile.duration * (1 - _ROUNDING):
         return None
@@ -293,9 +293,9 @@ def _within(profile: PhaseProfile, bounds: Array) -> bool:
     """
     if profile.chain.order == 3 and _clearly_within(profile.chain, bounds.tolist()):
         return True
-    curve, room = profile.curve(), _ROOM * np.abs(bounds)
+    curve, slack = profile.curve(), _ROOM * np.abs(bounds)
     ends = np.array([np.ravel(curve.piece_ends(order)) for order in (1, 2, 3)])
-    low, high = (bounds + np.where(np.isfinite(room), room, 0.0) * [-1.0, 1.0]).T[:, :, None]
+    low, high = (bounds + np.where(np.isfinite(slack), slack, 0.0) * [-1.0, 1.0]).T[:, :, None]
     return bool(((low <= ends) & (ends <= high)).all())
 
 
@@ -305,9 +305,9 @@ def _clearly_within(chain: PhaseChain, bounds: Sequence[Sequence[float]]) -> boo
     if not times or min(times) < _LONG * max(times):
         return False
     _, velocities, accelerations = zip(*chain.states, strict=True)
-    room = 1 + 0.5 * _ROOM
+    slack = 1 + 0.5 * _ROOM
     for values, (low, high) in zip((velocities, accelerations, chain.constants), bounds, strict=True):
-        if not (low * room <= min(values) and max(values) <= high * room):
+        if not (low * slack <= min(values) and max(values) <= high * slack):
             return False
     return True
 

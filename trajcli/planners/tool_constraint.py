@@ -114,9 +114,9 @@ class ToolConstraint:
         along = self._along(first, second)
         linear = _translation_rows(tangent, along, curvature, limits.acceleration)
         angular = _rotation_rows(first[:, 3:], second[:, 3:], turning, limits.angular_acceleration)
-        most, most_angular = self._speeds(s, side)
+        highest, most_angular = self._speeds(s, side)
         with np.errstate(divide="ignore"):
-            speed = np.minimum(most / tangent, most_angular / turning)
+            speed = np.minimum(highest / tangent, most_angular / turning)
         cap = np.minimum(speed**2, angular[3])
         slowing = [np.full((s.size, 1), each) for each in (-1.0, 0.0, self.deceleration)]
         a, b, c = (np.hstack(each) for each in zip(linear, angular[:3], slowing, strict=True))
@@ -127,9 +127,9 @@ class ToolConstraint:
         limits = self.limits
         _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
         tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
-        most, most_angular = self._speeds(s, side)
+        highest, most_angular = self._speeds(s, side)
         with np.errstate(divide="ignore"):
-            speed = np.minimum(most / tangent, most_angular / turning)
+            speed = np.minimum(highest / tangent, most_angular / turning)
             curvature = np.linalg.norm(second[:, :3], axis=1)
             bend = limits.acceleration / _across(self._along(first, second), curvature)
         return np.asarray(np.minimum(speed**2, bend))
@@ -244,14 +244,14 @@ def _samples_of(law: LawPieces, length: float, count: int) -> tuple[list[Array],
 def _used(velocity: Array, acceleration: Array, speeds: tuple[Array, Array], limits: ToolLimits) -> Array:
     """Return the shares of speed and acceleration (2, N) that twists and their derivatives (N, 6) use."""
     rows = np.stack([velocity, acceleration]).reshape(2, -1, 2, 3)
-    most = np.full((len(velocity), 2), [limits.acceleration, limits.angular_acceleration])
-    return np.asarray((np.linalg.norm(rows, axis=3) / [np.stack(speeds, axis=1), most]).max(axis=2))
+    highest = np.full((len(velocity), 2), [limits.acceleration, limits.angular_acceleration])
+    return np.asarray((np.linalg.norm(rows, axis=3) / [np.stack(speeds, axis=1), highest]).max(axis=2))
 
 
 def _across(along: Array, curvature: Array) -> Array:
     """Return the size of the part of p'' square to p', (N,)."""
-    rest = np.sqrt(np.maximum(curvature**2 - along**2, 0.0))
-    return np.where(along == 0.0, curvature, rest)
+    across = np.sqrt(np.maximum(curvature**2 - along**2, 0.0))
+    return np.where(along == 0.0, curvature, across)
 
 
 def _translation_rows(

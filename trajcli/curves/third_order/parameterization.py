@@ -125,9 +125,9 @@ def jerk_limited_time_optimal(
     hasty = np.isfinite(hopeless) and not ends.rests
     law = smoothed_law(path, second, (bounds[1], bounds[2]), ends)
     search = _Search(limits, law, ends.rests, slower, hasty=hasty)
-    most = min(most_nodes(path), _FEWER) if hasty else most_nodes(path)
-    lost = search.refine(most, np.inf if ends.rests else hopeless)
-    search.settle(most, _SETTLING if ends.rests or hasty else _MOST_SETTLING)
+    allowed = min(most_nodes(path), _FEWER) if hasty else most_nodes(path)
+    lost = search.refine(allowed, np.inf if ends.rests else hopeless)
+    search.settle(allowed, _SETTLING if ends.rests or hasty else _MOST_SETTLING)
     law, stretch = search.best, search.stretch
     if stretch > 1.0 + max(_ACCEPTED * slower, _EXACT) and not ends.rests:
         raise search.unsettled()
@@ -185,7 +185,7 @@ class _Search:
         if rests and self.stretch > _FAR:
             self._take(law.slowed(self.stretch))
 
-    def refine(self, most: int, hopeless: float) -> float:
+    def refine(self, allowed: int, hopeless: float) -> float:
         """Refine the nodes while that pays; return the estimate of what is lost, in seconds."""
         self._step(_FIRST_GAP)
         self._converge(_FIRST_STEPS, hopeless)
@@ -199,7 +199,7 @@ class _Search:
             duration = self.law.duration
             if lost.sum() <= _LOST * duration:
                 break
-            parts = parts_for(lost, 0.5 * _LOST * duration, most - lost.size)
+            parts = parts_for(lost, 0.5 * _LOST * duration, allowed - lost.size)
             if (parts - 1).sum() <= _FEW_NEW * parts.size:
                 break
             self._cut(parts)
@@ -212,12 +212,12 @@ class _Search:
         """How long the best law lasts once it keeps the limits."""
         return self.best.duration * self.stretch
 
-    def _converge(self, most: int, hopeless: float = np.inf) -> None:
+    def _converge(self, allowed: int, hopeless: float = np.inf) -> None:
         """Make steps until the duration settles or oscillates, and limits are nearly kept.
 
         What is hopeless is left where a step does not halve the excess; a step that leads far does not count.
         """
-        last, left = np.inf, most
+        last, left = np.inf, allowed
         while left > 0:
             before, passed, best = self.law.duration, float(self.excess.max()), self._slowed_duration
             self._step(_GAP)
@@ -232,7 +232,7 @@ class _Search:
                 break
             last = change
 
-    def settle(self, most: int, steps: int) -> None:
+    def settle(self, allowed: int, steps: int) -> None:
         """Lower limits in the intervals that exceed them until little is left."""
         lowered, enough = (_LOWERED, _SETTLED) if self.rests else (_LOWERED_MORE, min(self.slower, _SETTLED))
         best, idle = self.stretch, 0
@@ -242,7 +242,7 @@ class _Search:
             # what is left after many steps may be the bound's own: it is nearer in shorter pieces
             passed = 1.0 if step and step % _SETTLING == 0 else _STUBBORN
             stubborn = ((self.excess > passed) & (self.lowered > passed)).any(axis=0)
-            if stubborn.any() and self.law.lengths.size + stubborn.sum() <= most:
+            if stubborn.any() and self.law.lengths.size + stubborn.sum() <= allowed:
                 if self.rests:
                     self.lowered[:, stubborn] = 1.0
                 self._cut(np.where(stubborn, 2, 1))

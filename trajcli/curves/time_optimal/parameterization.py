@@ -322,33 +322,33 @@ def _solution_on_grid(problem: PathProblem, grid: Array, before: GridSolution | 
 def _refined_solution(problem: PathProblem) -> tuple[GridSolution, int, float]:
     """Return the solution on a fine enough grid, how often it was refined, and what is lost."""
     path = problem.joints.path
-    grid, most, before = first_grid(path), most_intervals(path), None
+    grid, allowed, before = first_grid(path), most_intervals(path), None
     for rounds in range(_ROUNDS + 1):
         try:
             before = solution = _solution_on_grid(problem, grid, before)
         except (StandstillError, UnreachableSpeedError):  # a finer grid has room for a little more
-            if rounds >= _TRIES or 2 * grid.size > most:
+            if rounds >= _TRIES or 2 * grid.size > allowed:
                 raise
             grid = halved(grid)
             continue
-        parts, share = _parts(solution, most - grid.size + 1)
+        parts, share = _parts(solution, allowed - grid.size + 1)
         if rounds == _ROUNDS or (parts == 1).all():
             break
         grid = refined(grid, solution.x, parts)
     return solution, rounds, share
 
 
-def _parts(solution: GridSolution, room: int) -> tuple[NDArray[np.intp], float]:
+def _parts(solution: GridSolution, slack: int) -> tuple[NDArray[np.intp], float]:
     """Return into how many parts to cut each interval, and the share of the duration that is lost."""
     lost, durations, straight = solution.lost, solution.pieces.durations, solution.intervals.straight
     duration, bent = float(durations.sum()), np.where(straight, 0.0, lost)
     share, estimate = float(lost.sum()) / duration, solution.problem.estimate
     parts = np.ones(lost.size, dtype=np.intp)
-    if share > estimate * _LOST and room > _FEW_NEW * lost.size:
-        parts = parts_for(bent, estimate * _AIM * duration, room)
+    if share > estimate * _LOST and slack > _FEW_NEW * lost.size:
+        parts = parts_for(bent, estimate * _AIM * duration, slack)
     switching = straight & (lost > _SWITCHING * durations)
     settled = lost[switching].sum() <= _SETTLED * bent.sum()
-    if not settled and (parts - 1).sum() + switching.sum() <= room:
+    if not settled and (parts - 1).sum() + switching.sum() <= slack:
         parts[switching] = 2
     return parts, share
 

@@ -48,7 +48,7 @@ class FastestMotion:
 
 
 def fastest_motion(
-    problem: WaypointProblem, names: list[str], starts: int, known: Array | None = None
+    problem: WaypointProblem, names: list[str], starts: int, near: Array | None = None
 ) -> FastestMotion:
     """Return the fastest motion that is found.
 
@@ -56,7 +56,7 @@ def fastest_motion(
         problem: Points, limits, and what is given.
         names: Of its joints, for messages.
         starts: How many starting points are tried.
-        known: States (K + 1, n, 2) of a motion through the points, from which alone it is searched then.
+        near: States (K + 1, n, 2) of a motion through the points, from which alone it is searched then.
 
     Raises:
         PlanningError: When none is found.
@@ -67,7 +67,7 @@ def fastest_motion(
     short = problem.only(kept)
     straight = _straight_candidate(short, names)
     states = None if straight is None else _states_of(short, straight)
-    found = search(short, starts, states, lower, None if known is None else known[kept])
+    found = search(short, starts, states, lower, None if near is None else near[kept])
     motion = straight
     if straight is None or found.best.duration < straight.duration * (1 - _SLOWER):
         exact = _exact(short, found.best, names)
@@ -108,8 +108,8 @@ def _keeps_positions(problem: WaypointProblem, motion: PointMotion) -> bool:
         return True
     (found,) = peaks(motion.curve, (0,))
     low, high = problem.position.T
-    room = _TOUCH * np.maximum(1.0, np.abs(problem.points).max(axis=0))
-    return bool((found.low >= low - room).all() and (found.high <= high + room).all())
+    slack = _TOUCH * np.maximum(1.0, np.abs(problem.points).max(axis=0))
+    return bool((found.low >= low - slack).all() and (found.high <= high + slack).all())
 
 
 def _none_found(problem: WaypointProblem, names: list[str]) -> PlanningError:

@@ -73,7 +73,7 @@ def search(
     starts: int,
     straight: Array | None = None,
     lower: float = 0.0,
-    known: Array | None = None,
+    given: Array | None = None,
 ) -> Found:
     """Return the fastest motion that the first starting points lead to.
 
@@ -82,14 +82,14 @@ def search(
         starts: How many starting points are tried, 1 to 8.
         lower: A proven lower bound of the duration, s: once it is met no further starting points are tried.
         straight: States (K + 1, n, 2) of the motion along the polyline, where some points are collinear.
-        known: States of a motion through the points: it is one of those that are compared, and the only
+        given: States of a motion through the points: it is one of those that are compared, and the only
             starting point has eight free knots in each segment, and its times.
     """
     time, lengths = problem.units
     polyline = None if straight is None else _scaled(problem, straight)
     along = _stopping if polyline is None else (lambda problem, stopping, best: polyline)
     begins = (_STARTS[0], along, *_STARTS[2:])[:starts]
-    near = None if known is None else _scaled(problem, known)
+    near = None if given is None else _scaled(problem, given)
     found = _found(
         problem.reachable().scaled(), begins if near is None else (_from_best(8),), lower / time, near
     )
@@ -104,7 +104,7 @@ def _scaled(problem: WaypointProblem, states: Array) -> Array:
     return np.asarray(states / np.stack([lengths / time, lengths / time**2], axis=1))
 
 
-def _found(problem: WaypointProblem, starts: Sequence[Start], lower: float, known: Array | None) -> Found:
+def _found(problem: WaypointProblem, starts: Sequence[Start], lower: float, given: Array | None) -> Found:
     """Return the fastest motion that is found, all in the units of the problem."""
     stopping = evaluated(problem, problem.stopping())
     if problem.walled and np.isfinite(stopping.duration):
@@ -112,8 +112,8 @@ def _found(problem: WaypointProblem, starts: Sequence[Start], lower: float, know
     if problem.segments == 1 or problem.fixed.all():
         return Found(stopping, (stopping.duration,) * len(starts), stopping.duration)
     best = stopping
-    if known is not None:
-        best = min(best, within_position_limits(problem, known), key=lambda motion: motion.duration)
+    if given is not None:
+        best = min(best, within_position_limits(problem, given), key=lambda motion: motion.duration)
     durations: list[float] = []
     for number, start in enumerate(starts, 1):
         if durations and best.duration <= lower * (1 + _PROVEN):
@@ -165,7 +165,7 @@ def states_by_free_knots(problem: WaypointProblem, times: Array, intervals: int)
 def knot_problem(problem: WaypointProblem, times: Array, intervals: int) -> KnotProblem:
     """Return the problem with so many intervals, for segments that last about so long (K,)."""
     time, speeds = float(times.mean()), problem.scales[:, 0]
-    room = np.abs(problem.position - problem.points[..., None]) / (speeds * time)[:, None]
+    slack = np.abs(problem.position - problem.points[..., None]) / (speeds * time)[:, None]
     return KnotProblem(
         time,
         np.stack([problem.velocity.T / speeds, problem.acceleration.T / (speeds / time)]),
@@ -174,7 +174,7 @@ def knot_problem(problem: WaypointProblem, times: Array, intervals: int) -> Knot
         problem.least / time,
         np.repeat(_LEAST * times[:, None] / time / intervals, intervals, axis=1),
         ~problem.fixed,
-        np.minimum(room, _FAR) if problem.walled else None,
+        np.minimum(slack, _FAR) if problem.walled else None,
     )
 
 

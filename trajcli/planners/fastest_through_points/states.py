@@ -91,21 +91,21 @@ def improved(
     """
     if problem.segments == 1 or not np.isfinite(motion.duration):
         return motion
-    region, known = _FIRST, state_times(problem, motion.states)
+    region, survey = _FIRST, state_times(problem, motion.states)
     history = [motion.duration] * _PATIENCE
     for _ in range(rounds):
         late, gained = len(history) > 2 * _PATIENCE, history[-_PATIENCE] - motion.duration
         if region < _SMALLEST or (late and gained < _HOPE * (motion.duration - rival)):
             break
         history.append(motion.duration)
-        change, foreseen = _step(problem, motion, known, region)
+        change, foreseen = _step(problem, motion, survey, region)
         if foreseen <= _ENOUGH * motion.duration:
             break
         other = evaluated(problem, motion.states + change)
         gain = motion.duration - other.duration
         if gain > 0:
             motion = other
-            known = state_times(problem, motion.states)
+            survey = state_times(problem, motion.states)
         if gain >= _GOOD * foreseen:
             region = min(2 * region, _LARGEST)
         elif gain < _POOR * foreseen:
@@ -114,18 +114,18 @@ def improved(
 
 
 def _step(
-    problem: WaypointProblem, motion: StateMotion, known: StateTimes, region: float
+    problem: WaypointProblem, motion: StateMotion, survey: StateTimes, region: float
 ) -> tuple[Array, float]:
     """Return the change of the states (K + 1, n, 2) and the gain that it promises."""
     segments, joints = problem.steps.shape
-    unit, usual = float(motion.times.mean()), np.maximum(known.alone.max(axis=1), problem.least)
+    unit, usual = float(motion.times.mean()), np.maximum(survey.alone.max(axis=1), problem.least)
     count = _WITH_WALLS if problem.walled else _WALLS
     rows = np.zeros((segments, joints, count, 5))
     low, high = np.full((2, segments, joints, count), _FAR) * np.array([-1.0, 1.0])[:, None, None, None]
     free = ~problem.fixed
     both = np.concatenate([free[:-1], free[1:]], axis=2)
-    rows[:, :, _TIME, :4], rows[:, :, _TIME, 4] = -known.slopes / unit * both, 1.0
-    low[:, :, _TIME] = np.maximum((known.alone - usual[:, None]) / unit, -_FAR)
+    rows[:, :, _TIME, :4], rows[:, :, _TIME, 4] = -survey.slopes / unit * both, 1.0
+    low[:, :, _TIME] = np.maximum((survey.alone - usual[:, None]) / unit, -_FAR)
     _fill_state_rows(problem, motion, region, rows, (low, high))
     if problem.walled:
         wall = distances(problem, motion.times, motion.states)

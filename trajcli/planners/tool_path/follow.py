@@ -73,15 +73,15 @@ class FollowingDiagnosis:
         """Return the error of an arm that could not be followed beyond some s."""
         return self._unreachable(error.s) or self._singular(error.s, error.joints, error.rates)
 
-    def unfit(self, at: float, guess: Callable[[Array], Array], most: int) -> PlanningError:
+    def unfit(self, at: float, guess: Callable[[Array], Array], allowed: int) -> PlanningError:
         """Return the error of joints that no curve of so many pieces follows around some s or time."""
         step = _SLOPE * self.end
         around = np.clip(np.array([at - step, at, at + step]), 0.0, self.end)
         before, here, after = guess(around)
         rates = (after - before) / (around[2] - around[0])
-        return self._unreachable(at) or self._singular(at, here, rates, most=most)
+        return self._unreachable(at) or self._singular(at, here, rates, allowed=allowed)
 
-    def refuse_limits(self, curve: PiecewisePolynomial, room: float) -> None:
+    def refuse_limits(self, curve: PiecewisePolynomial, slack: float) -> None:
         """Refuse a curve that leaves the range of a joint: the branch is fixed, and going slower is no help.
 
         Raises:
@@ -90,7 +90,7 @@ class FollowingDiagnosis:
         (extremes,) = peaks(curve, (0,))
         low, high = self.robot.limits.position.T
         beyond = np.maximum(low - extremes.low, extremes.high - high)
-        if not (beyond > room).any():
+        if not (beyond > slack).any():
             return
         joint = int(beyond.argmax())
         below = low[joint] - extremes.low[joint] > extremes.high[joint] - high[joint]
@@ -179,28 +179,28 @@ class FollowingDiagnosis:
                 return False
         return True
 
-    def _last_reached(self, low: float, high: float, known: Array) -> float:
-        """Return how far beyond `low`, where joint values (k, n) are known, some meet the target."""
+    def _last_reached(self, low: float, high: float, near: Array) -> float:
+        """Return how far beyond `low`, where joint values (k, n) are near, some meet the target."""
         from trajcli.kinematics.inverse.numeric import descend
 
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
-            reference = self.reference(np.full(len(known), middle), "left")
-            joints, met = descend(self._arm(reference, 0), reference.target(), known, None)
+            reference = self.reference(np.full(len(near), middle), "left")
+            joints, met = descend(self._arm(reference, 0), reference.target(), near, None)
             if met.any():
-                low, known = middle, joints[met]
+                low, near = middle, joints[met]
             else:
                 high = middle
         return low
 
-    def _singular(self, at: float, joints: Array, rates: Array, most: int | None = None) -> PlanningError:
+    def _singular(self, at: float, joints: Array, rates: Array, allowed: int | None = None) -> PlanningError:
         """Return the error that names the singularity at `at`, and the joint that goes fastest there."""
         bare = Follower(self.robot, self.reference, joints, np.empty((0, joints.size)))
         rows = bare.rows(self.reference(np.array([at]), "right"), *linearisation(self.robot, joints[None]))
         values = np.linalg.svd(rows[0], compute_uv=False)
         ratio = float(values[len(joints) - self.free - 1] / values[0])
-        if ratio > _REGULAR and (self.free or most is not None):
-            return self._regular(at, most)
+        if ratio > _REGULAR and (self.free or allowed is not None):
+            return self._regular(at, allowed)
         joint = int(np.abs(rates).argmax())
         name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
@@ -216,10 +216,12 @@ class FollowingDiagnosis:
         amounts: Amounts = {"joint": name, "place": self._s(at)}
         return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
 
-    def _regular(self, at: float, most: int | None) -> PlanningError:
-        message = f"{most} pieces do not meet the tolerance on this path, worst around s = {{place}}"
+    def _regular(self, at: float, allowed: int | None) -> PlanningError:
+        message = f"{allowed} pieces do not meet the tolerance on this path, worst around s = {{place}}"
         hint = "choose a larger `tolerance`, or split the path"
-        if most is None:
+        if limits_tool(self.robot):
+            hint = "split the path, or move it: limits of the tool ask for 1e-6 m and rad"
+        if allowed is None:
             message = (
                 "what the target leaves free cannot be held beyond s = {place} of the path: "
                 "{robot} would have to turn round in its place"
@@ -295,8 +297,8 @@ class FollowedPath:
             yield
         except LostError as error:
             diagnosis = diagnosis_on_path(self.robot, self.path, self.follower)
-            most = most_pieces(self.path.breaks)
-            raise diagnosis.unfit(float(error.s[0]), self.coarse.evaluate, most) from None
+            allowed = most_pieces(self.path.breaks)
+            raise diagnosis.unfit(float(error.s[0]), self.coarse.evaluate, allowed) from None
 
     def by_s(self, tolerance: Tolerance) -> PiecewisePolynomial:
         """Return q(s) within half of a tolerance: what a law multiplies the rest with must still be within.
@@ -357,8 +359,8 @@ def followed_in_time(robot: Robot, motion: ToolMotion, start: Array) -> Piecewis
         PlanningError: Where the arm cannot follow, and why.
     """
     middle = np.array([0.5 * motion.law.end])
-    known = follower(robot, lambda _, side: motion.reference_at(middle, side), start, 0.0)
-    exact = replace(known, reference_at=motion.reference_at)
+    held = follower(robot, lambda _, side: motion.reference_at(middle, side), start, 0.0)
+    exact = replace(held, reference_at=motion.reference_at)
     diagnosis = diagnosis_of_motion(robot, motion, exact)
     try:
         coarse = track_branch(exact, motion.breaks)
