@@ -14,17 +14,18 @@ from trajcli.frozen import frozen
 from trajcli.grids import Grid, UniformGrid
 from trajcli.judge.judgement import Judgement
 from trajcli.output.delivery.joined_rows import JoinedRows
+from trajcli.output.write import grid_of
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan
 from trajcli.streams.decimals import Digits
-from trajcli.streams.formats import StreamFormat
+from trajcli.streams.formats import DEFAULT, StreamFormat
 
 if TYPE_CHECKING:
     from trajcli.job.report import RowsReport
 
 _FASTER = (2, 4, 8, 16)  # times the rate
 _FASTEST = 8000.0  # Hz: no controller takes rows at more
-_MOST = 200_000  # rows that are tried
+_ROWS_TRIED = 200_000  # rows that are tried
 _STATES: tuple[Group, ...] = ("t", "q", "qd", "qdd")
 _WITHOUT_JERK = 2  # derivatives that are judged of cubics
 _WITHOUT_ACCELERATION = _STATES[:3]
@@ -128,21 +129,21 @@ def rows_that_keep(rows: JoinedRows, form: StreamFormat | None = None) -> Iterat
     return (other for other in _others(rows, form) if keeps(other.rows))
 
 
-def _at_knots(rows: JoinedRows, groups: tuple[Group, ...], output: Mapping[str, Any]) -> OtherRows:
-    """Return the rows at the knots of the same motion."""
-    from trajcli.knots import knot_grid, knots_of, stated_by
-
-    trajectory = rows.plan.trajectory
-    knots = knots_of(trajectory, stated_by(groups))
-    grid = knot_grid(trajectory, knots, None, rows.grid.start_time)
-    return OtherRows(replace(rows, grid=grid, groups=groups), output)
+def _other(rows: JoinedRows, form: StreamFormat | None, output: Mapping[str, Any]) -> OtherRows:
+    """Return the rows of the same motion where a job says so of its output."""
+    loaded = rows.plan.loaded
+    said = loaded.job.output.model_copy(update=output)
+    job = loaded.job.model_copy(update={"output": said})
+    plan = replace(rows.plan, loaded=replace(loaded, job=job))
+    made = joined_rows(plan, grid_of(plan), form or DEFAULT)
+    return OtherRows(replace(rows, grid=made.grid, groups=made.groups), output)
 
 
 def rate_that_keeps(rows: JoinedRows) -> float | None:
     """Return a higher rate at which rows keep the limits between them; None where none is found."""
     grid = rows.grid
     for rate in (grid.rate * times for times in _FASTER) if isinstance(grid, UniformGrid) else ():
-        if rate > _FASTEST or grid.duration * rate > _MOST:
+        if rate > _FASTEST or grid.duration * rate > _ROWS_TRIED:
             break
         try:
             faster = UniformGrid(grid.duration, rate, grid.start_time)
@@ -153,7 +154,7 @@ def rate_that_keeps(rows: JoinedRows) -> float | None:
     return None
 
 
-def _others_at_knots(rows: JoinedRows, content: str) -> Iterator[OtherRows]:
+def _others_at_knots(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
     """Yield rows at the knots of the same motion, also with columns that join them in another way."""
     from trajcli.knots import has_knots
 
@@ -162,10 +163,10 @@ def _others_at_knots(rows: JoinedRows, content: str) -> Iterator[OtherRows]:
         return
     output = {} if there else {"rows": "knots"}
     if "q" in rows.groups and not there:
-        yield _at_knots(rows, rows.groups, output)
-    for columns in (_STATES, _WITHOUT_ACCELERATION) if content == "rows" else ():
+        yield _other(rows, form, output)
+    for columns in (_STATES, _WITHOUT_ACCELERATION) if (form or DEFAULT).content == "rows" else ():
         if "q" not in rows.groups or replace(rows, groups=columns).interpolation != rows.interpolation:
-            yield _at_knots(rows, columns, {**output, "columns": columns})
+            yield _other(rows, form, {**output, "columns": columns})
 
 
 def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
@@ -173,14 +174,12 @@ def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
     full = None if {*_STATES} <= {*rows.groups} else _STATES
     if "q" not in rows.groups and full is None:
         return  # rows of the tool alone
-    content = "rows" if form is None else form.content
-    yield from _others_at_knots(rows, content)
-    if full is not None and content == "rows" and rows.plan.loaded.job.output.rows != "knots":
-        yield OtherRows(replace(rows, groups=full), {"columns": full})
-    if content != "log" and "qdd" in rows.groups:
-        shorter = replace(rows, groups=_WITHOUT_ACCELERATION)
-        yield OtherRows(shorter, {"columns": _WITHOUT_ACCELERATION})
+    content, there = (form or DEFAULT).content, rows.plan.loaded.job.output.rows == "knots"
+    yield from _others_at_knots(rows, form)
+    if full is not None and content == "rows" and not there:
+        yield _other(rows, form, {"columns": full})
+    if content != "log" and "qdd" in rows.groups and not (there and content == "rows"):
+        yield _other(rows, form, {"columns": _WITHOUT_ACCELERATION})
     rate = rate_that_keeps(rows)
     if rate is not None:
-        grid = UniformGrid(rows.grid.duration, rate, rows.grid.start_time)
-        yield OtherRows(replace(rows, grid=grid), {"rate": rate})
+        yield _other(rows, form, {"rate": rate})
