@@ -10,6 +10,7 @@ import numpy as np
 
 from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array
+from trajcli.geometry.rotation import NO_ANGLE
 from trajcli.job.explanation import (
     ArcSegmentReport,
     ChoiceReport,
@@ -258,7 +259,7 @@ def _screw(screw: Screw) -> ScrewSegmentReport:
     rotation, origin = screw.start[:3, :3], screw.start[:3, 3]
     moved, turned = rotation @ screw.twist[:3], rotation @ screw.twist[3:]
     angle = float(np.linalg.norm(turned))
-    if angle == 0:
+    if angle <= NO_ANGLE:
         distance = float(np.linalg.norm(moved))
         return ScrewSegmentReport(axis=_plain(moved / distance), angle=0.0, advance=distance)
     axis = turned / angle

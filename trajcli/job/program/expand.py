@@ -10,7 +10,7 @@ from trajcli.frozen import frozen
 from trajcli.job.program.many import MOST_ENTRIES, SECTIONS, ManyNames, Rounds, fields_of
 from trajcli.job.program.parts import Parts
 from trajcli.job.yaml.document import Document, Node
-from trajcli.language.numbers import ReadingContext, shown
+from trajcli.language.numbers import ReadingContext, flaw_of_name, shown
 from trajcli.suggest import did_you_mean, valid_names
 from trajcli.units import Units
 
@@ -199,9 +199,12 @@ class _Expansion:
         """Refuse other keys than these and a label, and what is no label."""
         self._names.only(entry, (*keys, "label"), path)
         label = entry.child("label")
-        if label is not None and not isinstance(label.value, str):
-            message = f"expected a text, got {shown(label.plain())}"
-            raise self._names.refused(message, (*path, "label"))
+        if label is None:
+            return
+        text = label.plain()
+        flaw = flaw_of_name(text) if isinstance(text, str) else f"expected a text, got {shown(text)}"
+        if flaw is not None:
+            raise self._names.refused(flaw, (*path, "label"))
 
     def _count_repeat(self, entry: Node, path: _Path, bound: frozenset[str], chain: tuple[str, ...]) -> int:
         self._only(entry, ("repeat", "moves"), path)
