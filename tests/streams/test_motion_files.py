@@ -1,0 +1,178 @@
+"""Files of motions that somebody else wrote: what was put into them comes out in SI, row by row, with its place."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from trajcli.errors import FileError, InputError
+from trajcli.streams import byte_source, recorded_motion
+from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.recorded_motion import blocks_of_size, open_motion
+
+DEGREE = np.pi / 180
+
+
+def written(folder: Path, names: str, rows: Any, name: str = "rows.csv") -> Path:
+    path = folder / name
+    path.write_text(names + "\n" + "".join(",".join(map(str, row)) + "\n" for row in rows), encoding="utf-8")
+    return path
+
+
+def test_numbers_are_si_by_the_units_of_their_columns(tmp_path: Path) -> None:
+    names = "t_ms,q1_deg,q2_mm,qd1_deg,qd2_mm,move"
+    rows = np.array([[20 * k, 5.25 * k, 100.5 - k, -0.125 * k, k - 30.5, k // 3] for k in range(10)])
+    path = written(tmp_path, names, [[*row[:5], int(row[5])] for row in rows.tolist()])
+    found = open_motion(path, joint_types=("revolute", "prismatic"))
+    whole = found.whole()
+    assert whole.t == pytest.approx(rows[:, 0] / 1e3)
+    assert whole.q == pytest.approx(rows[:, 1:3] * [DEGREE, 1e-3])
+    assert whole.qd == pytest.approx(rows[:, 3:5] * [DEGREE, 1e-3])
+    assert (whole.qdd, whole.tau, whole.first_row) == (None, None, 1)
+    assert whole.move is not None
+    assert whole.move.tolist() == rows[:, 5].tolist()
+    assert found.largest == pytest.approx(np.abs(rows[:, 1:3]).max(axis=0) * [DEGREE, 1e-3])
+    assert found.columns == {"q": ("q1_deg", "q2_mm"), "qd": ("qd1_deg", "qd2_mm")}
+    assert found.quantities == ("q", "qd", "move")
+    assert found.period is not None
+    assert found.period.period == pytest.approx(0.02)
+    columns = [(c.name, c.quantity, c.joint, c.factor) for c in found.written_columns()]
+    assert columns == [
+        ("t_ms", "t", None, 1e-3),
+        ("q1_deg", "q", 0, pytest.approx(DEGREE)),
+        ("q2_mm", "q", 1, 1e-3),
+        ("qd1_deg", "qd", 0, pytest.approx(DEGREE)),
+        ("qd2_mm", "qd", 1, 1e-3),
+        ("move", "move", None, 1.0),
+    ]
+
+
+@pytest.mark.parametrize("size", [1, 3, 4, 10, 11])
+def test_blocks_are_the_rows_one_after_the_other_and_say_which_is_their_first(
+    size: int, tmp_path: Path
+) -> None:
+    path = written(tmp_path, "t,q1", [[k, k * k] for k in range(10)])
+    found = open_motion(path)
+    for _ in range(2):
+        blocks = list(found.blocks(size))
+        assert [len(block.t) for block in blocks] == [size] * (10 // size) + (
+            [10 % size] if 10 % size else []
+        )
+        assert [block.first_row for block in blocks] == [*range(1, 11, size)]
+        assert np.concatenate([block.q[:, 0] for block in blocks]).tolist() == [k * k for k in range(10)]
+
+
+@pytest.mark.parametrize("lengths", [[10], [1] * 10, [3, 4, 3], [7, 3], [0, 5, 0, 5]])
+@pytest.mark.parametrize("size", [1, 2, 3, 5, 10, 20])
+def test_no_row_is_lost_or_doubled_by_another_size_of_blocks(lengths: list[int], size: int) -> None:
+    rows = np.arange(20.0).reshape(10, 2)
+    parts = np.split(rows, np.cumsum(lengths)[:-1])
+    found = list(blocks_of_size(iter(parts), size))
+    assert np.concatenate(found).tolist() == rows.tolist()
+    assert {len(block) for block in found[:-1]} <= {size}
+    assert 0 < len(found[-1]) <= size
+
+
+@pytest.mark.parametrize(
+    ("names", "bad", "said", "hint"),
+    [
+        ("t,q1", [1.5, "1e101"], "q1 is 1e+101 in row 8", "exponent"),
+        ("t,q1,move", [1.5, 0, 0.5], "move is 0.5 in row 8", "--columns move=none"),
+        ("t,q1,move", [1.5, 0, "1e17"], "move is 1e+17 in row 8", "--columns move=none"),
+    ],
+)
+def test_a_number_that_no_motion_has_is_refused_with_its_row(
+    names: str, bad: list[Any], said: str, hint: str, tmp_path: Path
+) -> None:
+    width = names.count(",")
+    rows = [[k / 10, *[0] * width] for k in range(7)] + [[1.5, *bad[1:]], [2, *[0] * width]]
+    path = written(tmp_path, names, rows)
+    with pytest.raises(InputError) as caught:
+        open_motion(path)
+    (problem,) = caught.value.problems
+    assert said in problem.message
+    assert hint in (problem.hint or "")
+
+
+def test_rows_that_are_too_many_to_be_kept_are_read_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = [[k, k * k] for k in range(10)]
+    monkeypatch.setattr(recorded_motion, "_KEPT", 5)
+    found = open_motion(written(tmp_path, "t,q1", rows))
+    assert found.whole().q[:, 0].tolist() == [k * k for k in range(10)]
+    assert found.rows == 10
+
+
+def test_binary_stamps_are_as_exact_as_their_last_bit(tmp_path: Path) -> None:
+    """Since 1970 a float64 tells 2.4e-7 s apart; nine decimals of it say no more than that."""
+    rows = [[f"{1.7e9 + k / 100:.9f}", 0.5 * k] for k in range(5)]
+    resolution = open_motion(written(tmp_path, "t,q1", rows)).resolution
+    assert resolution.time == np.spacing(1.7e9) / 2
+    milliseconds = [[f"{1.7e12 + k * 10:.6f}", 0.5 * k] for k in range(5)]
+    resolution = open_motion(written(tmp_path, "t_ms,q1_deg", milliseconds)).resolution
+    assert resolution.time == pytest.approx(np.spacing(1.7e12) / 2 / 1e3)
+
+
+def test_joints_named_in_another_order_have_their_own_types_and_units(tmp_path: Path) -> None:
+    """The file has the turn first; the robot has the slide first, which nothing but its type says is in m."""
+    names = "t,turn_position,slide_position,turn_velocity,slide_velocity"
+    rows = [[k / 10, 90 + k, 250 - k, 9, -10] for k in range(4)]
+    found = open_motion(
+        written(tmp_path, names, rows),
+        joints=("slide", "turn"),
+        joint_types=("prismatic", "revolute"),
+        units="deg,mm",
+    )
+    whole = found.whole()
+    assert found.joints == ("slide", "turn")
+    assert whole.q[0] == pytest.approx([0.25, np.pi / 2])
+    assert whole.qd is not None
+    assert whole.qd[0] == pytest.approx([-0.01, 9 * DEGREE])
+    assert found.columns["q"] == ("slide_position", "turn_position")
+
+
+class TestByteSources:
+    """Files and pipes, as often as they are asked for."""
+
+    def test_a_file_is_given_from_its_first_byte(self, tmp_path: Path) -> None:
+        path = tmp_path / "a.CSV"
+        path.write_bytes(b"0123456789")
+        source = ByteSource(path, 25.0)
+        assert (source.file, source.ending, source.rate) == (str(path), ".csv", 25.0)
+        assert [source.head(4) for _ in range(2)] == [b"0123"] * 2
+        with source.open() as stream:
+            assert stream.read() == b"0123456789"
+
+    @pytest.mark.parametrize("in_memory", [1, 1 << 24])
+    def test_a_pipe_is_kept_and_has_no_ending(self, in_memory: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(byte_source, "_IN_MEMORY", in_memory)
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"0123456789")))
+        source = ByteSource("-")
+        assert (source.file, source.ending, source.rate) == ("stdin", "", None)
+        assert [source.head(4) for _ in range(2)] == [b"0123"] * 2
+        with source.open() as stream:
+            assert stream.read() == b"0123456789"
+
+    def test_what_is_no_plain_file_is_read_to_its_end(self, tmp_path: Path) -> None:
+        """A named pipe gives its bytes once; its name says nothing of what they are."""
+        import os
+        from threading import Thread
+
+        pipe = tmp_path / "rows.csv"
+        os.mkfifo(pipe)
+        writer = Thread(target=pipe.write_bytes, args=(b"t,q1\n0,1\n",))
+        writer.start()
+        source = ByteSource(pipe)
+        writer.join()
+        assert (source.file, source.ending) == (str(pipe), "")
+        assert [source.head(99) for _ in range(2)] == [b"t,q1\n0,1\n"] * 2
+
+    @pytest.mark.parametrize("name", ["missing.csv", "."])
+    def test_what_cannot_be_read_is_said(self, name: str, tmp_path: Path) -> None:
+        with pytest.raises(FileError, match="cannot read"):
+            ByteSource(tmp_path / name).head(1)
