@@ -1,0 +1,237 @@
+"""What `trajcli plan` says and leaves where it is asked for more than rows: options together, and its summary."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from running import EXAMPLES, FAST, JOB, call
+
+from trajcli.cli.plan import _beside_toppra, _compared, _summarise_consumer, violation_lines
+from trajcli.findings import Finding
+from trajcli.job.reports.comparisons import PeerViolation, ReferenceReport
+from trajcli.peers import move_reference
+from trajcli.planners.planner import PlannedMove
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = Path("job.yaml")
+    path.write_text(JOB, encoding="utf-8")
+    return path
+
+
+def names() -> set[str]:
+    return {path.name for path in Path().iterdir()}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--topics", "/tool_twits"),
+        ("--epoch", "nan"),
+        ("--epoch", "1", "--set", "output.start_time=-2"),
+        ("--set", "output.start_time=-2"),
+    ],
+)
+def test_options_of_a_log_are_refused_before_anything_is_written(
+    words: tuple[str, ...], capfd: Capture
+) -> None:
+    log = ("-o", "a.mcap") if words[0] != "--set" else ("-o", "a.mcap", "--compression", "none")
+    assert call(capfd, "plan", "job.yaml", *log, *words, "--resolved", "r.yaml").code == 2
+    assert names() == {"job.yaml"}
+
+
+def test_a_reference_excuses_no_finding(job: Path, capfd: Capture) -> None:
+    """A quintic of 30 deg in 0.25 s reaches 225 deg/s, the limit is 90."""
+    job.write_text(FAST, encoding="utf-8")
+    code, out, err = call(capfd, "plan", "job.yaml", "--reference", "-o", "rows.csv")
+    assert (code, out, names()) == (1, "", {"job.yaml"})
+    assert "reaches 225 deg/s" in err
+    assert "fastest" not in err
+
+
+@pytest.mark.parametrize(
+    ("output", "rows"), [("a.csv", ", 11 rows"), ("a.mcap", ", 11 rows"), ("a.yaml", "")]
+)
+def test_rows_are_counted_where_there_are_some(output: str, rows: str, capfd: Capture) -> None:
+    """At 10 Hz over 1 s; a message of ROS holds knots."""
+    err = call(capfd, "plan", "job.yaml", "-o", output).err
+    assert err.startswith(f"job: verified, 1 move, 1 s{rows}\n")
+    assert ("no geometry" in err) == output.endswith("mcap")
+
+
+def test_what_only_handles_is_no_move_and_times_count_from_the_start(job: Path, capfd: Capture) -> None:
+    job.write_text(JOB.replace("moves:\n", "moves:\n  - {signal: lamp, value: 1}\n"), encoding="utf-8")
+    err = call(capfd, "plan", "job.yaml", "--no-output", "--set", "output.start_time=5").err
+    assert err.startswith("job: verified, 1 move, 1 s\n")
+
+
+def test_what_was_computed_is_said_where_it_is_asked_for(capfd: Capture) -> None:
+    path = EXAMPLES / "time_optimal.yaml"
+    brief, verbose = (call(capfd, "plan", path, "--no-output", *word).err for word in ((), ("-v",)))
+    assert "  bound: " in verbose
+    assert "  bound: " not in brief
+    assert set(brief.splitlines()) < set(verbose.splitlines())
+
+
+def test_rows_have_the_digits_with_which_they_were_judged(job: Path, capfd: Capture) -> None:
+    """Third differences of nine decimals at 1 kHz are off by 8 * 0.5e-9 * 1e9 = 4 deg/s^3, much of a limit of 900."""
+    limited = JOB.replace("velocity: 90", "velocity: 90, acceleration: 360, jerk: 900")
+    job.write_text(
+        limited.replace("duration: 1", "duration: 3").replace(", columns: [t, q]", ""), encoding="utf-8"
+    )
+    words = ("plan", "job.yaml", "--for", "ros-jtc", "--rate", "1000", "-o", "rows.csv")
+    assert "every bit of its numbers written" in call(capfd, *words).err
+    with Path("rows.csv").open(encoding="utf-8") as rows:
+        values = [float(row["q1_deg"]) for row in csv.DictReader(rows)]
+    for k in (1, 2, 7):
+        s = k / 3000
+        assert values[k] == pytest.approx(30 * s**3 * (10 - 15 * s + 6 * s**2), rel=1e-13)
+
+
+RAMPS = JOB.replace("quintic, to: {joints: 30}, duration: 1", "trapezoid, to: {joints: 30}")
+RAMPS = RAMPS.replace("velocity: 90", "velocity: 90, acceleration: 100").replace("[t, q]", "[t, q, qd, qdd]")
+
+
+def test_rows_that_pass_a_limit_between_them_are_an_event(job: Path, capfd: Capture) -> None:
+    """A quintic between two rows that are each within a ramp's acceleration, up and down, overshoots."""
+    job.write_text(RAMPS, encoding="utf-8")
+    plain = call(capfd, "plan", "job.yaml", "-o", "a.csv")
+    assert (plain.code, "  joined_over_limit: the rows, joined" in plain.err) == (0, True)
+    strict = call(capfd, "plan", "job.yaml", "-o", "b.csv", "--strict")
+    assert (strict.code, names()) == (1, {"job.yaml", "a.csv"})
+    assert "joined_over_limit" in strict.err
+
+
+def test_moves_that_no_motion_could_do_so_fast_are_errors_in_their_places(
+    job: Path, capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bound of a second for each of two moves that last half of one, as a peer that is right would find."""
+    move = "  - {planner: trapezoid, to: {joints: 5}}\n"
+    job.write_text(RAMPS.replace("output:", move + "output:"), encoding="utf-8")
+    true = move_reference.reference_of
+
+    def slower(moved: PlannedMove) -> ReferenceReport | None:
+        found = true(moved)
+        return None if found is None or found.duration is None else replaced(found, 2 * found.duration)
+
+    monkeypatch.setattr("trajcli.peers.move_reference.reference_of", slower)
+    code, out, err = call(capfd, "plan", "job.yaml", "--reference", "-o", "rows.csv")
+    assert (code, out, names()) == (1, "", {"job.yaml"})
+    places = [line.split(" ")[0] for line in err.splitlines() if "error: " in line]
+    assert places == ["job.yaml:6:5:", "job.yaml:7:5:"]
+    assert "error: move 1 (trapezoid): " in err
+
+
+def replaced(report: ReferenceReport, duration: float) -> ReferenceReport:
+    return report.model_copy(update={"duration": duration, "ratio": report.duration / duration})
+
+
+@pytest.mark.parametrize("words", [("--format", "csv"), ("--no-output",)])
+def test_on_a_terminal_rows_come_only_where_their_form_is_named(
+    words: tuple[str, ...], capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = call(capfd, "plan", "job.yaml", *words).out
+    monkeypatch.setattr("trajcli.cli.plan.is_terminal", lambda stream: stream is sys.stdout)
+    assert call(capfd, "plan", "job.yaml", *words).out == expected
+    assert call(capfd, "plan", "job.yaml").out.split()[0] == "move"  # a table in their place
+
+
+def test_all_that_the_rules_of_a_consumer_say_is_said(capfd: Capture) -> None:
+    found = [
+        Finding("time", message="it is late", rule="p-late", count=3),
+        Finding("time", message="it is loud", rule="p-loud"),
+    ]
+    rules = SimpleNamespace(unjudged=[("p-heat", "no sensor"), ("p-dust", "no filter")], findings=found)
+    profile = SimpleNamespace(name="p")
+    made = SimpleNamespace(said=("slowed", "aligned"), summary="for p: joined", profile=profile, rules=rules)
+    _summarise_consumer(made)  # type: ignore[arg-type]
+    assert capfd.readouterr().err.splitlines() == [
+        "slowed",
+        "aligned",
+        "for p: joined",
+        "for p: all necessary rules are kept",
+        "  p-late: it is late (and 2 more rows)",
+        "  p-loud: it is loud",
+        "  not judged: p-heat, p-dust",
+    ]
+
+
+@pytest.mark.parametrize("words", [(), ("--rows", "knots")])
+def test_knots_have_no_rate(words: tuple[str, ...], capfd: Capture) -> None:
+    refused = call(capfd, "plan", "job.yaml", "-o", "a.yaml", "--rate", "50", *words)
+    assert (refused.code, names()) == (2, {"job.yaml"})
+    assert (
+        "--rate is about rows, a ROS message has knots\n  leave --rate out, or say --rows rate" in refused.err
+    )
+    assert call(capfd, "plan", "job.yaml", "-o", "a.yaml", "--rate", "50", "--rows", "rate").code == 0
+
+
+def moved(*speeds: tuple[float, float], tool: object = None) -> SimpleNamespace:
+    peaks = [SimpleNamespace(quantity="velocity", low=low, high=high) for low, high in speeds]
+    return SimpleNamespace(duration=3.0, tool=tool, peaks=peaks)
+
+
+@pytest.mark.parametrize(
+    ("move", "bound", "text"),
+    [
+        (moved(), {"duration": None, "joint": "a", "reason": "no limit"}, "no bound for a: no limit"),
+        (
+            moved((0.0, 0.0), (-0.5, 0.0)),
+            {"duration": 0.0, "ratio": None},
+            "no bound: it ends where it starts",
+        ),
+        (moved((0.0, 0.0), (-1e-12, 1e-12)), {"duration": 0.0, "ratio": None}, "nothing to move"),
+        (moved(), {"through_points": False}, "3 s, 1.5 x the fastest under the same limits (2 s)"),
+        (
+            moved(tool=1),
+            {"through_points": False},
+            "3 s, 1.5 x the fastest off the path under the same limits (2 s)",
+        ),
+        (
+            moved(tool=1),
+            {"through_points": True},
+            "3 s, 1.5 x the fastest through its points under the same limits (2 s)",
+        ),
+    ],
+)
+def test_a_move_is_compared_with_the_fastest(move: SimpleNamespace, bound: dict[str, Any], text: str) -> None:
+    reference = SimpleNamespace(**({"duration": 2.0, "ratio": 1.5} | bound))
+    assert _compared(move, reference) == text  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("tool", "aside"), [(None, ""), (1, ", which does not know the limits of the tool")])
+def test_a_move_is_compared_with_toppra(tool: object, aside: str) -> None:
+    own = SimpleNamespace(used=0.98, quantity="acceleration", joint="a")
+    other = SimpleNamespace(used=1.23, quantity="velocity", joint="b")
+    beside = SimpleNamespace(duration=2.0, ratio=1.1, own_use=own, use=other)
+    assert _beside_toppra(moved(tool=tool), beside) == (  # type: ignore[arg-type]
+        f"1.1 x toppra along the same path (2 s{aside}); "
+        "most used of a limit: 98 % (acceleration of a), toppra 123 % (velocity of b)"
+    )
+
+
+def test_of_limits_that_a_peer_breaks_the_worst_is_said() -> None:
+    def broken(quantity: str, joint: str, value: float, limit: float) -> PeerViolation:
+        return PeerViolation(quantity=quantity, joint=joint, value=value, limit=limit, time=0.0, unit="u")
+
+    faster = (
+        broken("velocity", "a", -3.0, -1.0),
+        broken("jerk", "b", 500.0, 250.0),
+        broken("velocity", "c", 2, 1),
+    )
+    (line,) = violation_lines("ruckig", faster)
+    assert line == "  ruckig breaks a limit: the velocity of a reaches -3 u, its limit is -1, and 2 more"
+    (line,) = violation_lines("ruckig", [*faster, broken("position", "d", 1.01, 1.0)])
+    assert line == "  ruckig breaks a limit: the position of d reaches 1.01 u, its limit is 1, and 3 more"
+    (line,) = violation_lines("toppra", faster[1:2])
+    assert line == "  toppra breaks a limit: the jerk of b reaches 500 u, its limit is 250"
+    assert list(violation_lines("toppra", ())) == []
