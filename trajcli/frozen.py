@@ -58,10 +58,10 @@ def _completed(
     named: dict[str, Any],
 ) -> tuple[Any, ...]:
     """Return a value for each of the names: those given in order, those given by name, and defaults."""
-    rest = names[len(values) :]
-    if len(values) > len(names) or not named.keys() <= set(rest):
+    others = names[len(values) :]
+    if len(values) > len(names) or not named.keys() <= set(others):
         raise TypeError(f"{cls.__name__} takes {', '.join(names)}, each once")
-    return (*values, *[named[name] if name in named else _default(cls, name) for name in rest])
+    return (*values, *[named[name] if name in named else _default(cls, name) for name in others])
 
 
 def _default(cls: Any, name: str) -> Any:  # noqa: ANN401

@@ -73,11 +73,11 @@ def version_lines() -> Iterator[str]:
 
     yield f"trajcli {__version__}"
     yield f"Python {platform.python_version()} on {platform.system()} {platform.machine()}"
-    known = libraries()
-    for library in (library for library in known if not library.extra):
+    found = libraries()
+    for library in (library for library in found if not library.extra):
         yield f"{library.name} {library.installed}" if library.fits() else library.sentence()
-    for extra in dict.fromkeys(library.extra for library in known if library.extra):
-        lacking = [library.name for library in known if library.extra == extra and not library.fits()]
+    for extra in dict.fromkeys(library.extra for library in found if library.extra):
+        lacking = [library.name for library in found if library.extra == extra and not library.fits()]
         yield f"extra {extra}: {'lacks ' + ', '.join(lacking) if lacking else 'installed'}"
 
 
@@ -85,16 +85,16 @@ def library_error(error: BaseException) -> InputError | None:
     """Return what an error comes of where that is a library: a missing, a broken or an old one; else None."""
     from trajcli.errors import InputError
 
-    known = {library.name: library for library in libraries() if not library.extra}
+    needed = {library.name: library for library in libraries() if not library.extra}
     name = (error.name or "").partition(".")[0] if isinstance(error, ImportError) else ""
     if name and name != __name__.partition(".")[0]:
         name = _DISTRIBUTIONS.get(name, name)
-        library = known.get(name) or Library(name, installed=_installed(name))
+        library = needed.get(name) or Library(name, installed=_installed(name))
         if not library.fits():
             return InputError(library.sentence())
         forced = library.command().replace("install", "install --force-reinstall")
         return InputError(f"the library {name} {library.installed} cannot be loaded ({error}): {forced}")
-    old = [library for library in known.values() if library.installed and not library.fits()]
+    old = [library for library in needed.values() if library.installed and not library.fits()]
     return InputError(old[0].sentence()) if old else None
 
 

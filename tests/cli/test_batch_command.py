@@ -260,6 +260,7 @@ WRONG = [
     (("jobs", "jobs/a.yaml", "-o", "out"), "would both be written to out/a.csv"),
     (("jobs", "--format", "ros"), "would overwrite jobs/a.yaml"),
     (("-",), "a batch reads no standard input"),
+    (("jobs", "--for", "ros-jct"), "there is no profile 'ros-jct'\n  did you mean 'ros-jtc'?"),
 ]
 
 
@@ -272,6 +273,17 @@ def test_a_wrong_batch_is_2_and_nothing_begins(words: tuple[str, ...], message: 
     assert message in err
     assert files(".") == {"jobs"}
     assert files("jobs") == {"a.yaml"}
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_consumer_that_nobody_has_costs_no_rows(capfd: Capture) -> None:
+    """Rows of jobs whose files are wrong are set aside; here no file is."""
+    write(a=JOB)
+    assert batch(capfd) == (0, {"a": "written"})
+    before = files("out")
+    assert call(capfd, "batch", "jobs", "-o", "out", "--for", "nobody").code == 2
+    assert files("out") == before
+    assert batch(capfd) == (0, {"a": "unchanged"})
 
 
 def test_an_output_folder_that_is_a_file(folder: Path, capfd: Capture) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import json
+import math
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +13,16 @@ from typing import Any
 import pytest
 from running import EXAMPLES, FAST, JOB, call
 
-from trajcli.cli.plan import _beside_toppra, _compared, _summarise_consumer, violation_lines
+from trajcli.cli.plan import (
+    _beside_toppra,
+    _compared,
+    _flown,
+    _moves,
+    _steps,
+    _summarise_consumer,
+    violation_lines,
+)
+from trajcli.errors import Amount
 from trajcli.findings import Finding
 from trajcli.job.reports.comparisons import PeerViolation, ReferenceReport
 from trajcli.peers import move_reference
@@ -106,6 +117,7 @@ def test_rows_that_pass_a_limit_between_them_are_an_event(job: Path, capfd: Capt
     job.write_text(RAMPS, encoding="utf-8")
     plain = call(capfd, "plan", "job.yaml", "-o", "a.csv")
     assert (plain.code, "  joined_over_limit: the rows, joined" in plain.err) == (0, True)
+    assert "  the acceleration steps: j1 at t = 0 s and 2 more\n" in plain.err  # up, down, and to rest
     strict = call(capfd, "plan", "job.yaml", "-o", "b.csv", "--strict")
     assert (strict.code, names()) == (1, {"job.yaml", "a.csv"})
     assert "joined_over_limit" in strict.err
@@ -235,3 +247,59 @@ def test_of_limits_that_a_peer_breaks_the_worst_is_said() -> None:
     (line,) = violation_lines("toppra", faster[1:2])
     assert line == "  toppra breaks a limit: the jerk of b reaches 500 u, its limit is 250"
     assert list(violation_lines("toppra", ())) == []
+
+
+def stepping(*steps: tuple[str, float, float]) -> SimpleNamespace:
+    """Return a plan of a turn `a` and a slide `b`, in deg and mm, whose acceleration steps so often."""
+    units = {0: (180 / math.pi, "deg/s^2"), 1: (1e3, "mm/s^2")}
+
+    def say(amount: Amount) -> str:
+        scale, unit = units[amount.joint or 0]
+        return f"{amount.value * scale:.6g} {unit}" if amount.order == 2 else "?"
+
+    found = [SimpleNamespace(joint=joint, time=time, size=size) for joint, time, size in steps]
+    return SimpleNamespace(
+        verdict=SimpleNamespace(steps=found),
+        trajectory=SimpleNamespace(joint_names=("a", "b")),
+        loaded=SimpleNamespace(say=say),
+    )
+
+
+def test_steps_of_the_acceleration_are_named_or_counted() -> None:
+    nine = [("a", 0.5 + k, 1.0) for k in range(9)]
+    assert _steps(stepping(*nine[:1])) == ": a at t = 0.5 s"  # type: ignore[arg-type]
+    assert _steps(stepping(*nine)) == ": a at t = 0.5 s and 8 more"  # type: ignore[arg-type]
+    ten = [*nine, ("b", 9.5, -2.5)]
+    assert _steps(stepping(*ten)) == " 10 times, by up to 2500 mm/s^2 (b at t = 9.5 s)"  # type: ignore[arg-type]
+
+
+def test_of_many_moves_five_are_named() -> None:
+    assert _moves([3]) == "move 3"
+    assert _moves(range(5)) == "moves 0, 1, 2, 3, 4"
+    assert _moves(range(2, 8)) == "moves 2, 3, 4, 5, 6 and 1 more"
+    assert _moves(range(9)) == "moves 0, 1, 2, 3, 4 and 4 more"
+
+
+def test_corners_flown_by_save_a_part_of_the_time_with_stops() -> None:
+    flyby = SimpleNamespace(zones=(1, 2), duration=7.5, stopping=10.0, second_order=6.0)
+    text = "flies by 2 corners: 25 % less than the 10 s of stopping there; bound: 6 s (second_order)"
+    assert _flown(flyby) == text  # type: ignore[arg-type]
+    one = SimpleNamespace(zones=(1,), duration=7.5, stopping=10.0, second_order=None)
+    assert _flown(one) == "flies by 1 corner: 25 % less than the 10 s of stopping there"  # type: ignore[arg-type]
+
+
+def test_what_is_not_checked_is_named(capfd: Capture) -> None:
+    """What has no limit, by the job; what is only sampled, by the report."""
+    assert (
+        "  without a limit, not checked: position, acceleration, jerk\n"
+        in call(capfd, "plan", "job.yaml").err
+    )
+    err = call(capfd, "plan", EXAMPLES / "line.yaml", "--no-output", "--report", "r.json").err
+    (line,) = [line for line in err.splitlines() if line.startswith("  on samples only: branch, moves ")]
+    moves = json.loads(Path("r.json").read_text(encoding="utf-8"))["moves"]
+    along = [move["index"] for move in moves if move["tool"] is not None]
+    assert len(along) == 5
+    assert line.endswith(f" {', '.join(map(str, along))}")
+    tool = ("--set", "limits.tcp.speed=1", "--set", "limits.tcp.angular_speed=1")
+    text = "  limited, but not checked in every move: speed, angular speed of the tool\n"
+    assert text in call(capfd, "plan", "job.yaml", *tool).err

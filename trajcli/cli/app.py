@@ -53,9 +53,9 @@ class Commands(typer.core.TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Return the command of the first word, its name, and the words behind it."""
-        known = _OTHER_NAMES.get(args[0].lower())
-        if args[0] not in self.commands and known is not None:
-            ctx.fail(f"No such command '{args[0]}': here it is `{known}`.")
+        other = _OTHER_NAMES.get(args[0].lower())
+        if args[0] not in self.commands and other is not None:
+            ctx.fail(f"No such command '{args[0]}': here it is `{other}`.")
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401
@@ -72,18 +72,18 @@ class Commands(typer.core.TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the commands by group, each with the first sentence of its help, uncut."""
         for title, words in GROUPS.items():
-            known = [(word, self.commands[word].help or "") for word in words if word in self.commands]
-            if known:
+            records = [(word, self.commands[word].help or "") for word in words if word in self.commands]
+            if records:
                 with formatter.section(title):
-                    formatter.write_dl([(word, _first_sentence(text)) for word, text in known])
+                    formatter.write_dl([(word, _first_sentence(text)) for word, text in records])
 
-    def main(self, args: Sequence[str] | None = None, *rest: Any, **options: Any) -> Any:  # noqa: ANN401
+    def main(self, args: Sequence[str] | None = None, *more: Any, **options: Any) -> Any:  # noqa: ANN401
         """Run the command; errors of usage have the form that the words ask for."""
         form = _form_of_errors(sys.argv[1:] if args is None else args)
         if form is None:
-            return super().main(args, *rest, **options)
+            return super().main(args, *more, **options)
         try:
-            code = super().main(args, *rest, **{**options, "standalone_mode": False})
+            code = super().main(args, *more, **{**options, "standalone_mode": False})
         except Exception as error:
             words = getattr(error, "format_message", None)
             if words is None:  # no error of usage

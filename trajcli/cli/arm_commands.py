@@ -64,18 +64,18 @@ def joined(args: list[str]) -> list[str]:
     A word that has commas itself holds all the numbers.
     """
     words: list[str] = []
-    rest = list(args)
-    while rest and rest[0] != "--":
-        word = rest.pop(0)
+    left = list(args)
+    while left and left[0] != "--":
+        word = left.pop(0)
         name, equals, value = word.partition("=")
         if name not in JOINED:
             words.append(word)
             continue
         values = [value] if equals else []
-        while rest and _NUMBER_LIKE.fullmatch(rest[0]) and "," not in "".join(values):
-            values.append(rest.pop(0))
+        while left and _NUMBER_LIKE.fullmatch(left[0]) and "," not in "".join(values):
+            values.append(left.pop(0))
         words += [f"{name}={','.join(values)}"] if values else [word]
-    return words + rest
+    return words + left
 
 
 def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
@@ -89,18 +89,18 @@ def sorted_words(args: list[str], takes: Mapping[str, int]) -> list[str]:
     """
     options: list[str] = []
     others: list[str] = []
-    rest = list(args)
-    while rest and rest[0] != "--":
-        word = rest.pop(0)
+    left = list(args)
+    while left and left[0] != "--":
+        word = left.pop(0)
         if word == "-" or not word.startswith("-") or _NUMBER_LIKE.fullmatch(word):
             others.append(word)
             continue
         count = takes.get(word, 0)
-        if len(rest) < count or "--" in rest[:count]:
+        if len(left) < count or "--" in left[:count]:
             return [*options, word]
-        options += [word, *rest[:count]]
-        rest = rest[count:]
-    return [*options, "--", *others, *rest[1:]]
+        options += [word, *left[:count]]
+        left = left[count:]
+    return [*options, "--", *others, *left[1:]]
 
 
 class NumbersCommand(Command):

@@ -36,10 +36,14 @@ def run_batch(options: BatchCommand) -> int:
         BrokenPipeError: When the reader has closed the pipe.
     """
     limits = processes_of(options), timeout_of(options)
+    if options.consumer is not None:
+        from trajcli.consumers.judgement import load_profile
+
+        load_profile(options.consumer)  # what there is not no job can be planned for
     found = find_jobs(options.jobs, options.output, options.form)
     record = Ledgers(found.jobs)
-    known = {} if options.force else record.entries()
-    tasks = [Task(job, known.get(job.output)) for job in found.jobs]
+    entries = {} if options.force else record.entries()
+    tasks = [Task(job, entries.get(job.output)) for job in found.jobs]
     setup = BatchSetup(options.form, found.owners(), options.rows, options.consumer, options.strict)
     progress = Progress(len(tasks))
     try:
@@ -145,8 +149,8 @@ def _in_words(outcome: JobOutcome, progress: Progress) -> str:
 
     lasts = "" if outcome.duration is None else f"{outcome.duration:.6g} s"
     word = f"{outcome.outcome:{progress.widest}}"
-    room = columns() - len(word) - len(lasts) - 4
-    name = shortened(shown(utf8(outcome.job.job)), room)
+    space = columns() - len(word) - len(lasts) - 4
+    name = shortened(shown(utf8(outcome.job.job)), space)
     return f"{painted(word, RED if outcome.exit_code else GREEN, sys.stdout)}  {name}  {lasts}".rstrip()
 
 
@@ -161,8 +165,8 @@ def _say_why(outcome: JobOutcome, aside: str | None, errors: ErrorForm) -> None:
 
 
 def _error(outcome: JobOutcome) -> TrajcliError:
-    known = (InputError, VerificationError, PlanningError, FileError)
-    kind = next((each for each in known if each.exit_code == outcome.exit_code), TrajcliError)
+    kinds = (InputError, VerificationError, PlanningError, FileError)
+    kind = next((each for each in kinds if each.exit_code == outcome.exit_code), TrajcliError)
     return kind(*outcome.problems)
 
 

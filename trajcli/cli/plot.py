@@ -50,8 +50,8 @@ def run_plot(options: PlotCommand) -> int:
     read = [file for plan in plans for file in files_of(plan.loaded.document)]
     refuse_overwriting([("the picture", target)], [*read, *(("the rows of", name) for name in rows)])
     sources = [ByteSource(name) for name in rows]
-    known = None if plan is None else plan.loaded.robot.joint_names
-    tables = [read_table(source, joints=known) for source in sources]
+    names = None if plan is None else plan.loaded.robot.joint_names
+    tables = [read_table(source, joints=names) for source in sources]
     judged = [] if plan is None else _checked_files(sources, plan, options)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its caches are is nobody's concern
     with np.errstate(all="ignore"):  # what is not finite was found by the checks

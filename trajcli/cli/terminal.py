@@ -76,9 +76,9 @@ def fitted_table(rows: Sequence[Sequence[str]], yielding: Sequence[int]) -> Iter
     rows = [[shown(cell) for cell in row] for row in rows]
     for column in yielding:
         wide = max(map(len, table_lines(rows, "")), default=0) - columns()
-        room = max(max(len(row[column]) for row in rows) - max(wide, 0), _LEAST)
+        width = max(max(len(row[column]) for row in rows) - max(wide, 0), _LEAST)
         rows = [
-            [shortened(cell, room) if k == column else cell for k, cell in enumerate(row)] for row in rows
+            [shortened(cell, width) if k == column else cell for k, cell in enumerate(row)] for row in rows
         ]
     yield from table_lines(rows, "")
 
