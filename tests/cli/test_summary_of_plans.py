@@ -66,7 +66,7 @@ def test_a_reference_excuses_no_finding(job: Path, capfd: Capture) -> None:
     code, out, err = call(capfd, "plan", "job.yaml", "--reference", "-o", "rows.csv")
     assert (code, out, names()) == (1, "", {"job.yaml"})
     assert "reaches 225 deg/s" in err
-    assert "fastest" not in err
+    assert not [line for line in err.splitlines() if line.startswith("move 0")]  # it is compared with nothing
 
 
 @pytest.mark.parametrize(
@@ -220,6 +220,16 @@ def test_a_move_is_compared_with_the_fastest(move: SimpleNamespace, bound: dict[
     assert _compared(move, reference) == text  # type: ignore[arg-type]
 
 
+def test_each_move_is_compared(job: Path, capfd: Capture) -> None:
+    """A quintic over 10 deg in 1 s beside sqrt(4 * 10 / 100) s, half the time at each bound of the acceleration."""
+    text = RAMPS.replace("output:", "  - {planner: quintic, to: {joints: 40}, duration: 1}\noutput:")
+    job.write_text(text, encoding="utf-8")
+    err = call(capfd, "plan", "job.yaml", "--no-output", "--reference").err
+    lines = [line for line in err.splitlines() if line.startswith("move ")]
+    assert lines[0].startswith("move 0 (trapezoid): 1.09545 s, 1 x the fastest under")
+    assert lines[1].startswith(f"move 1 (quintic): 1 s, {1 / math.sqrt(0.4):.4g} x the fastest under")
+
+
 @pytest.mark.parametrize(("tool", "aside"), [(None, ""), (1, ", which does not know the limits of the tool")])
 def test_a_move_is_compared_with_toppra(tool: object, aside: str) -> None:
     own = SimpleNamespace(used=0.98, quantity="acceleration", joint="a")
@@ -303,3 +313,27 @@ def test_what_is_not_checked_is_named(capfd: Capture) -> None:
     tool = ("--set", "limits.tcp.speed=1", "--set", "limits.tcp.angular_speed=1")
     text = "  limited, but not checked in every move: speed, angular speed of the tool\n"
     assert text in call(capfd, "plan", "job.yaml", *tool).err
+
+
+@pytest.mark.parametrize("output", [(), ("-o", "-")])
+def test_bytes_are_not_for_a_terminal(
+    output: tuple[str, ...], capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    terminal = SimpleNamespace(stdout=SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("trajcli.cli.plan.sys", terminal)
+    refused = call(capfd, "plan", "job.yaml", "--format", "mcap", *output)
+    assert (refused.code, refused.out) == (2, "")
+    assert "MCAP is not written to a terminal" in refused.err
+    assert call(capfd, "plan", "job.yaml", "--format", "csv", *output).code == 0
+    judged = ("plan", "job.yaml", "--format", "mcap", "--for", "ros-jtc", "--no-output", "-q")
+    assert "terminal" not in call(capfd, *judged).err
+
+
+@pytest.mark.parametrize("option", ["-o", "--report", "--resolved"])
+@pytest.mark.parametrize("name", ["job.yaml", "arm.yaml"])
+def test_what_the_job_was_read_from_stays(option: str, name: str, job: Path, capfd: Capture) -> None:
+    Path("arm.yaml").write_text("joints: [{velocity: 90}]\n", encoding="utf-8")
+    job.write_text(JOB.replace("{joints: [{velocity: 90}]}", "{file: arm.yaml}"), encoding="utf-8")
+    before = {path: path.read_bytes() for path in Path().iterdir()}
+    assert call(capfd, "plan", "job.yaml", option, name).code == 2
+    assert {path: path.read_bytes() for path in Path().iterdir()} == before
