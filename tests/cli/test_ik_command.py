@@ -233,3 +233,19 @@ def test_the_bounds_of_tolerance(arms, name):
         code, out, err = arms.call("ik", "--robot", name, "--si", "--pose", said, f"--tolerance={tolerance}")
         assert (code, out) == (2, "")
         assert "--tolerance must be from 1e-12 to 1" in err
+
+
+def test_flags_of_a_maker_say_what_is_not_met(arms):
+    pose = "{xyz: [0.3, 0.1, 0.5], rpy: [0, 90, 0], configuration: {abb: [0, -1, %d, %d]}}"
+    asked = {
+        (0, 0): (0, True),
+        (-4, 0): (0, True),  # -289 deg is within the range of joint 6
+        (1, 0): (0, False),
+        (0, 3): (3, True),
+    }
+    for (sixth, branch), (code, met) in asked.items():
+        told = arms.call("ik", "--robot", "irb120", "--pose", pose % (sixth, branch))
+        assert told.code == code
+        assert ("turns of joint_6 not as asked" in told.out) != met
+    assert told.out == ""
+    assert "abb [0, -1, 0, 3] only outside the limits" in told.err

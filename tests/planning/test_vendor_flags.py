@@ -137,11 +137,33 @@ def test_turns_out_of_range_are_an_event_and_the_nearest_are_taken() -> None:
     np.testing.assert_allclose(end(plan), ABB[0][0], atol=1e-6)
 
 
+def test_of_several_turns_that_fit_the_nearest_is_first() -> None:
+    robot = load_robot("irb4600")
+    joints = np.radians(ABB[2][0])
+    for sixth, values in ((100, (190, -170)), (-100, (-170, 190))):
+        near = np.radians([0, 0, 0, 0, 0, sixth])
+        found, missed = kuka_flags(2, None).in_turns(robot, joints, near)
+        kept = found[np.abs(found[:, 3] - joints[3]) < 1.0]
+        np.testing.assert_allclose(np.degrees(kept[:, 5]), values)
+        assert missed == []
+
+
+def test_turns_do_not_move_a_joint_that_is_pinned() -> None:
+    to = {**pose_of("irb4600", ABB[2][0]), "joints": {"joint_6": -170}}
+    for sixth, missed in ((-2, False), (2, True)):
+        plan = planned("irb4600", {**to, "configuration": {"abb": [-1, -2, sixth, 0]}})
+        np.testing.assert_allclose(end(plan), [-20, 30, 5, -100, 40, -170], atol=1e-6)
+        assert any(event.kind == "turns_not_met" for event in plan.events) == missed
+
+
 def test_flags_hold_on_a_path_and_on_a_rail() -> None:
     robot = {"rail": {"axis": "y", "velocity": 1, "acceleration": 2, "jerk": 20}, "arm": "irb4600"}
     to = {**pose_of("irb4600", ABB[1][0]), "joints": {"rail": 0}, "configuration": {"abb": ABB[1][1]}}
     plan = planned(robot, to, [0, *[0] * 4, 20, 0])
     np.testing.assert_allclose(end(plan)[1:], ABB[1][0], atol=1e-6)
+    other = planned(robot, {**to, "configuration": {"abb": [0, 0, 1, 1]}}, [0, *[0] * 4, 20, 0])
+    (event,) = [event for event in other.events if event.kind == "turns_not_met"]
+    assert "says turns of joint_6 that" in event.message
     line = {"planner": "line", "law": {"shape": "quintic", "duration": 2}}
     job = {
         "version": 1,

@@ -148,6 +148,50 @@ def test_the_numbers_of_a_maker_choose_one_answer_each() -> None:
     assert (np.sum(postures, axis=0) == chosen).all()
 
 
+def test_the_quadrants_of_a_maker_choose_the_turns() -> None:
+    """ABB, `confdata`: quadrant k of a joint is from 90 k to 90 (k + 1) deg."""
+    arm = ArmInUnits(load_robot("irb4600"), Units("deg", "m"))
+    pose = forward(arm.robot, np.radians([-20, 30, 5, -100, 40, 190]))
+    wanted = Wanted(partial_target(pose[:3, 3], rotation=pose[:3, :3]))
+    for sixth, value in ((2, 190.0), (-2, -170.0)):
+        asked = replace(wanted, configuration=Configuration(abb=(-1, -2, sixth, 0)))
+        same(told(arm, asked), (-20, 30, 5, -100, 40, value))
+    near = (-20, 30, 5, 300, 40, 150)
+    same(
+        told(arm, replace(wanted, configuration=Configuration(abb=(-1, -2, -2, 0))), near)[:1],
+        (-20, 30, 5, -100, 40, -170),
+    )
+    with_turns = replace(wanted, configuration=Configuration(abb=(-1, 2, 2, 0)))
+    same(told(arm, with_turns, turns=True), (-20, 30, 5, 260, 40, 190))
+    missing = replace(wanted, configuration=Configuration(abb=(-1, -2, 0, 0)))
+    solutions, chosen = find_answers(arm, missing, None, 1e-6)
+    found = answer_reports(arm, solutions, chosen, missing, turns=True)
+    assert [report["turns_not_met"] for report in found] == [["joint_6"]] * 2
+    assert sorted(round(report["joints"][5]) for report in found) == [-170, 190]
+    for near, value in ((None, -170), ((0, 0, 0, 0, 0, 100), 190)):
+        same(told(arm, missing, near), (-20, 30, 5, -100, 40, value))
+    pinned = replace(missing, configuration=Configuration(abb=(-1, -2, 2, 0)), pins={5: np.radians(-170.0)})
+    solutions, chosen = find_answers(arm, pinned, None, 1e-6)
+    (report,) = answer_reports(arm, solutions, chosen, pinned)
+    assert report["turns_not_met"] == ["joint_6"]
+    np.testing.assert_allclose(report["joints"], (-20, 30, 5, -100, 40, -170), atol=1e-6)
+
+
+def test_a_posture_of_a_maker_beyond_the_limits_is_no_answer() -> None:
+    arm = ArmInUnits(load_robot("irb120"), Units())
+    wanted = Wanted(
+        partial_target(np.array([0.3, 0.1, 0.5]), rotation=np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]))
+    )
+    for posture in (2, 3, 4, 5, 6, 7):
+        asked = replace(wanted, configuration=Configuration(abb=(0, 0, 0, posture)))
+        solutions, chosen = find_answers(arm, asked, None, 1e-6)
+        assert chosen.sum() == 1
+        assert answer_reports(arm, solutions, chosen, asked) == []
+        with pytest.raises(PlanningError, match=rf"with abb \[0, 0, 0, {posture}\] only outside") as caught:
+            require_answer(arm, solutions, chosen, asked)
+        assert "left up no_flip" in str(caught.value.problems[0].hint)
+
+
 @pytest.mark.parametrize("configuration", [None, Configuration(elbow="up")])
 def test_a_point_out_of_reach_is_missed_by_what_is_between(configuration: Configuration | None) -> None:
     arm = planar(*WIDE)

@@ -93,6 +93,8 @@ def _lines(arm: ArmInUnits, solutions: Solutions, reports: Sequence[dict[str, An
         notes += ["singular"] if answer["singular"] else []
         if "free_direction" in answer:
             notes.append(f"free along {numbers(answer['free_direction'])}")
+        if "turns_not_met" in answer:
+            notes.append(f"turns of {', '.join(answer['turns_not_met'])} not as asked")
         joints = numbers(answer["joints"])
         yield f"  {joints}" + (f"   ({', '.join(notes)})" if notes else "")
     worst = max(answer["closure"] for answer in reports)

@@ -407,3 +407,13 @@ class Configuration(Model):
         """What is named of the branch itself, such as {"elbow": "up"}."""
         given = {key: getattr(self, key) for key in ("shoulder", "elbow", "wrist")}
         return {key: name for key, name in given.items() if name is not None}
+
+    @property
+    def asked(self) -> dict[str, str]:
+        """All that is named, such as {"elbow": "up"} or {"abb": "[0, 0, 0, 1]"}."""
+        return self.branch_names if self.flags is None else dict([self.flags.text.split(" ", 1)])
+
+    @property
+    def text(self) -> str:
+        """What is asked for in words, such as "left up" or "abb [0, 0, 0, 1]"."""
+        return " ".join(self.branch_names.values()) if self.flags is None else self.flags.text

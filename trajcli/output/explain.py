@@ -167,10 +167,10 @@ def _without_pins(robot: Robot, joints: Array, pins: Mapping[int, float]) -> tup
 def _resolved(pose: ResolvedPose, plan: Plan, robot: Robot) -> PoseReport:
     """Return how a pose of the tool of an arm was reached, in SI."""
     from trajcli.kinematics.inverse.target import ranks
-    from trajcli.planning.resolve_poses import asked_names
 
     solutions, joints = pose.solutions, pose.joints
-    asked, units = asked_names(pose.target.configuration), joint_units(robot.joint_types)
+    configuration, units = pose.target.configuration, joint_units(robot.joint_types)
+    asked = {} if configuration is None else configuration.asked
     pins = {} if pose.target.pinned is None else pose.target.pinned.by_index
     here, nearby = ranks(*_without_pins(robot, joints, pins), pose.ik_target)
     free = None

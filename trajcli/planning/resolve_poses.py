@@ -96,7 +96,7 @@ def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPos
     if flags is not None:
         usable &= flags.met(robot, solutions.joints)
     if not usable.any():
-        words = " ".join(asked_names(target.configuration).values())
+        words = (target.configuration or Configuration()).text
         others = sorted({names[k] for k in np.flatnonzero(solutions.within_limits)})
         message = f"{robot.name} does not reach the pose within its limits in the configuration {words}"
         raise PlanningError(Problem(message, f"it does in: {', '.join(others)}"))
@@ -108,25 +108,20 @@ def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPos
 
 def _in_turns(pose: ResolvedPose, flags: VendorFlags, robot: Robot) -> ResolvedPose:
     """Return the pose on the branch and in the turns that flags say; in the nearest where none are so."""
-    from trajcli.kinematics.inverse.joint_turns import all_turns
-    from trajcli.kinematics.inverse.vendor_flags import first_of_six
-
-    choices = [(k, all_turns(robot, pose.solutions.joints[k])) for k in np.flatnonzero(pose.usable).tolist()]
-    branches = np.concatenate([np.full(len(turned), k) for k, turned in choices])
-    joints = np.concatenate([turned for _, turned in choices])
-    missed = flags.missed_turns(robot, joints)
-    counts = missed.sum(axis=1)
-    far = np.where(counts == counts.min(), np.abs(joints - pose.near).max(axis=1), np.inf)
-    best = int(far.argmin())
-    branch, events = int(branches[best]), tuple[Event, ...]()
-    if missed[best].any():
-        first = first_of_six(robot)
-        wrong = [turn[0] for turn, off in zip(flags.turns, missed[best], strict=True) if off]
-        names = ", ".join(robot.joint_names[first + joint] for joint in wrong)
+    pins = () if pose.target.pinned is None else pose.target.pinned.by_index
+    turned = {
+        branch: flags.in_turns(robot, pose.solutions.joints[branch], pose.near, pins)
+        for branch in np.flatnonzero(pose.usable).tolist()
+    }
+    branch = min(turned, key=lambda k: (len(turned[k][1]), float(np.abs(turned[k][0][0] - pose.near).max())))
+    joints, missed = turned[branch]
+    events = tuple[Event, ...]()
+    if missed:
+        names = ", ".join(robot.joint_names[joint] for joint in missed)
         message = f"{flags.text} says turns of {names} that are not on this branch within the limits: "
         events = (Event("turns_not_met", message + "the nearest are taken"),)
     values = pose.solutions.joints.copy()
-    values[branch] = joints[best]
+    values[branch] = joints[0]
     solutions = replace(pose.solutions, joints=values)
     return replace(pose, solutions=solutions, branch=branch, events=events)
 
@@ -156,11 +151,3 @@ def _of_configuration(
             raise InputError(f"{robot.name} has no configuration '{word}'", hint=hint)
         chosen &= has
     return chosen
-
-
-def asked_names(wanted: Configuration | None) -> dict[str, str]:
-    """Return what a configuration names, such as {"elbow": "up"}, or its maker's flags."""
-    if wanted is None:
-        return {}
-    flags = wanted.flags
-    return wanted.branch_names if flags is None else dict([flags.text.split(" ", 1)])

@@ -54,20 +54,16 @@ def find_answers(
         PlanningError: When every joint is pinned.
     """
     solutions = solve_pinned(arm.robot, wanted.target, wanted.pins, near, tolerance)
-    names = _branch_names(wanted.configuration)
-    for choice in names:
+    configuration = wanted.configuration or Configuration()
+    for choice in configuration.branch_names:
         if getattr(solutions.names[0], choice) is None:
             raise InputError(
                 f"{arm.robot.name} has no choice of {choice} for this target: {solutions.method.reason}",
                 hint=f"leave {choice} out of `configuration`",
             )
-    chosen = solutions.valid & solutions.named(**names)
-    flags = None if wanted.configuration is None else wanted.configuration.flags
+    chosen = solutions.valid & solutions.named(**configuration.branch_names)
+    flags = configuration.flags
     return solutions, chosen if flags is None else chosen & flags.met(arm.robot, solutions.joints)
-
-
-def _branch_names(configuration: Configuration | None) -> dict[str, str]:
-    return {} if configuration is None else configuration.branch_names
 
 
 def answer_reports(
@@ -80,12 +76,13 @@ def answer_reports(
     every: bool = False,
     turns: bool = False,
 ) -> list[dict[str, Any]]:
-    """Return [{joints, branch, within_limits, closure, singular, free_direction?}] of one target.
+    """Return [{joints, branch, within_limits, closure, singular, ...}] of one target.
 
     `closure` is the larger of the miss in m and in rad. `singular`: of the directions that the target fixes,
     the tcp can move in fewer than it can nearby, as `ranks` finds. `free_direction` is a unit vector of joint
     values: the arm can move along it while what is fixed of the pose rests; without it the answer stands
-    alone, as that of a stretched arm does although it is singular.
+    alone, as that of a stretched arm does although it is singular. `turns_not_met` names the joints that no
+    turn within their limits brings where flags of a maker want them.
 
     Args:
         arm: The arm.
@@ -102,22 +99,31 @@ def answer_reports(
     others = [joint for joint in range(len(arm.robot.joints)) if joint not in wanted.pins]
     moving = without_pinned(arm.robot, wanted.pins) if wanted.pins else arm.robot
     here, nearby = ranks(moving, solutions.joints[usable][:, others], wanted.target)
-    reports = [
-        (joints, _answer(arm, solutions, branch, joints, wanted, lost))
-        for branch, lost in zip(usable.tolist(), (here < nearby).tolist(), strict=True)
-        for joints in (
-            _turned(arm, solutions.joints[branch], wanted) if turns else [solutions.joints[branch]]
-        )
-    ]
+    reports = []
+    for branch, lost in zip(usable.tolist(), (here < nearby).tolist(), strict=True):
+        found, missed = _turned(arm, solutions.joints[branch], wanted, near, turns=turns)
+        for joints in found:
+            reports.append((joints, _answer(arm, solutions, branch, joints, wanted, lost)))
+            if missed:
+                reports[-1][1]["turns_not_met"] = [arm.robot.joint_names[joint] for joint in missed]
     if near is not None:
         reports.sort(key=lambda pair: float(np.abs(pair[0] - near).max()))
     return [answer for _, answer in reports]
 
 
-def _turned(arm: ArmInUnits, joints: Array, wanted: Wanted) -> Array:
-    """Return joint values (n,) in every turn that the limits allow, (k, n); pinned ones stay."""
-    turned, pins = all_turns(arm.robot, joints), list(wanted.pins)
-    return np.asarray(turned[(turned[:, pins] == joints[pins]).all(axis=1)])
+def _turned(
+    arm: ArmInUnits, joints: Array, wanted: Wanted, near: Array | None, *, turns: bool
+) -> tuple[Array, list[int]]:
+    """Return joint values (n,) in the turns that are asked for, (k, n), and the joints that miss theirs."""
+    flags = (wanted.configuration or Configuration()).flags
+    if flags is not None and flags.turns:
+        found, missed = flags.in_turns(
+            arm.robot, joints, np.zeros_like(joints) if near is None else near, wanted.pins
+        )
+        return found[: None if turns else 1], missed
+    if not turns:
+        return joints[None], []
+    return all_turns(arm.robot, joints, wanted.pins), []
 
 
 def require_answer(arm: ArmInUnits, solutions: Solutions, chosen: Flags, wanted: Wanted) -> None:
@@ -128,7 +134,7 @@ def require_answer(arm: ArmInUnits, solutions: Solutions, chosen: Flags, wanted:
     """
     if (chosen & solutions.within_limits).any():
         return
-    named = " ".join(_branch_names(wanted.configuration).values())
+    named = (wanted.configuration or Configuration()).text
     if solutions.valid.any() and named:
         others = [
             str(name) for name, fine in zip(solutions.names, solutions.within_limits, strict=True) if fine

@@ -67,5 +67,8 @@ def test_every_turn_inside_is_a_choice_and_none_is_lost() -> None:
     assert (choices[:, 1:] == [2.0, 1.0]).all()  # no turn brings the second inside
     slides = all_turns(arm((-9.0, 9.0), kind="prismatic"), np.array([0.5]))
     assert slides.tolist() == [[0.5]]
+    pinned = all_turns(arm(wide, wide), np.array([0.5, 0.5]), [0])
+    assert (pinned[:, 0] == 0.5).all()
+    assert len(pinned) == 3
     edge = all_turns(arm((-np.pi, np.pi)), np.array([np.pi]))
     assert sorted(edge[:, 0]) == pytest.approx([-np.pi, np.pi])

@@ -5,6 +5,7 @@ A value counts as inside while it is within `limit * (1 + 1e-9) + 1e-12`, as eve
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import lru_cache
 from math import prod
 
@@ -81,18 +82,18 @@ def _wrapped(values: Array, aims: Array, low: Array, high: Array) -> Array:
     return result
 
 
-def all_turns(robot: Robot, joints: Array) -> Array:
+def all_turns(robot: Robot, joints: Array, pinned: Collection[int] = ()) -> Array:
     """Return one configuration (n,) with every choice of turns inside the limits, shape (choices, n).
 
-    A joint without limits keeps its value; so does one that no turn brings inside.
+    A joint without limits keeps its value; so does one that no turn brings inside, and one that is pinned.
 
     Raises:
         InputError: When there are too many to list.
     """
     wide, choices = widened(robot.limits.position), []
-    for value, turns, (low, high) in zip(joints, revolute(robot), wide, strict=True):
+    for joint, (value, turns, (low, high)) in enumerate(zip(joints, revolute(robot), wide, strict=True)):
         options = joints[:0]
-        if turns and np.isfinite([low, high]).all():
+        if turns and joint not in pinned and np.isfinite([low, high]).all():
             first, last = np.ceil((low - value) / FULL), np.floor((high - value) / FULL)
             options = value + FULL * np.arange(first, min(last, first + _LISTED) + 1)
         choices.append(options if options.size else [value])

@@ -14,7 +14,7 @@ programming instructions, Status and Turn; FANUC, Operator's manual, configurati
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import inf, pi
 
 import numpy as np
@@ -24,6 +24,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
 from trajcli.frozen import comparable
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.joint_turns import all_turns
 from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Robot
 
@@ -71,6 +72,31 @@ class VendorFlags:
         for values, wanted, at_home in sides:
             met &= _on_side(values, wanted, float(at_home))
         return met
+
+    def in_turns(
+        self, robot: Robot, joints: Array, near: Array, pinned: Collection[int] = ()
+    ) -> tuple[Array, list[int]]:
+        """Return joint values in the turns that are said, and which joints are in none of theirs.
+
+        A joint that no turn within its limits brings where it shall be may be in any of them.
+
+        Args:
+            robot: An arm with such branches.
+            joints: What is turned, (n,), rad or m.
+            near: Joint values (n,); the nearest to them come first.
+            pinned: Indices of joints that stay as they are.
+
+        Returns:
+            Joint values (K, n), K >= 1, and indices of joints.
+        """
+        turned = all_turns(robot, joints, pinned)
+        missed = self.missed_turns(robot, turned)
+        count = missed.sum(axis=1)
+        turned, missed = turned[count == count.min()], missed[count == count.min()]
+        order = np.abs(turned - near).max(axis=1).argsort(kind="stable")
+        first = first_of_six(robot)
+        wrong = [first + turn[0] for turn, off in zip(self.turns, missed[0], strict=True) if off]
+        return turned[order], wrong
 
     def missed_turns(self, robot: Robot, joints: Array) -> NDArray[np.bool_]:
         """Return for joint values (K, n) which of the turns are not as they are said, (K, turns)."""
