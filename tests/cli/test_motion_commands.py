@@ -248,3 +248,32 @@ def test_what_is_wrong(words: tuple[str, ...], code: int, message: str, folder: 
     assert message in outcome.err
     assert "Traceback" not in outcome.err
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("names", ["time [ms],shoulder_pos,elbow_pos", "t_ms,q0_deg,q1_deg"])
+def test_advice_for_other_names_is_followed_to_the_letter(names: str, folder: Path, capfd: Capture) -> None:
+    """What fk, plot and view refuse is refused no more once it is written in plain columns."""
+    (folder / "log.csv").write_text(f"{names}\n0,0,0\n250,90,0\n500,90,-90\n")
+    words = (
+        ["fk", "-r", "planar2r", "-"],
+        ["plot", "log.csv", "-o", "log.svg"],
+        ["view", "log.csv", "-o", "log.html"],
+    )
+    for line in words:
+        found = call(capfd, *line, stdin=(folder / "log.csv").read_text())
+        assert found.code == 2
+        assert "`trajcli convert FILE --si`" in found.err
+    found = call(capfd, "convert", "log.csv", "--si")
+    if "deg" not in names:
+        assert found.code == 2
+        assert "--units deg" in found.err
+        found = call(capfd, "convert", "log.csv", "--si", "--units", "deg")
+    assert found.out.splitlines()[0] == "t,q1,q2"
+    (folder / "log.csv").write_text(found.out)
+    told = call(capfd, *words[0], stdin=found.out)
+    poses = np.loadtxt(told.out.splitlines()[1:], delimiter=",")
+    # links of 0.3 m and 0.2 m
+    np.testing.assert_allclose(poses[:, 0], [0, 0.25, 0.5])
+    np.testing.assert_allclose(poses[:, 1:3], [[0.5, 0], [0, 0.5], [0.2, 0.3]], atol=1e-8)
+    for line in words[1:]:
+        assert call(capfd, *line).code == 0

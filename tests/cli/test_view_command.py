@@ -149,9 +149,12 @@ def test_a_job_from_standard_input_is_not_read_twice(folder: Path, capfd: pytest
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["view", "rows.csv", "-r", "ur5e", "-o", "v.html"], "expected q1 to q6 of UR5e"),
+        (
+            ["view", "rows.csv", "-r", "ur5e", "-o", "v.html"],
+            "UR5e has 6 joints, and there is no column q3, q4, q5, q6",
+        ),
         (["view", "rows.csv", "-r", "ur5ee", "-o", "v.html"], "did you mean"),
-        (["view", "rows.csv", "-r", "cylindrical", "-o", "v.html"], "has the joint columns"),
+        (["view", "rows.csv", "-r", "cylindrical", "-o", "v.html"], "q2_deg cannot be in deg"),
         (["view", "rows.csv", "--set", "a=1", "-o", "v.html"], "--set is for jobs"),
         (["view", "job.yaml", "-o", "v.csv"], "a page is HTML"),
         (["view", "job.yaml", "-o", "v"], "a page is HTML"),
@@ -173,6 +176,7 @@ def test_what_is_refused(
     [
         ("q1,q2\n1,2\n", "has no column 't'"),
         ("t,x\n0,1\n", "has the joint columns none"),
+        ("t,q0,q1\n0,1,2\n", "q0: joints are counted from 1"),
         ("t,q1,q3\n0,1,2\n", "has the joint columns q1, q3, expected q1, q2, ..."),
         ("t,q1\n0,1\n1,2\n1,3\n", "rows.csv, row 2 (from 0): the time 1 s follows 1 s"),
         ("# a log\nt,q1\n0,1\n0,2\n", "rows.csv, row 1 (from 0): the time 0 s follows 0 s"),
@@ -194,7 +198,7 @@ def test_units_must_fit_the_kinds_of_joints(folder: Path, capfd: pytest.CaptureF
     (folder / "rows.csv").write_text("t,q1_deg,q2_deg,q3_deg\n0,1,2,3\n")
     done = call(capfd, "view", "rows.csv", "-r", "rrp", "-o", "view.html")
     assert done.code == 2
-    assert "the column 'q3_deg' of rows.csv is no length" in done.err
+    assert "q3_deg cannot be in deg: j3 is prismatic" in done.err
 
 
 def test_inputs_stay(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
-from trajcli.editing.writing import as_read, write_motion, write_table
+from trajcli.editing.writing import as_read, plain_columns, write_motion, write_table
 from trajcli.errors import InputError
 
 TABLES = [  # of a stranger, each written again
@@ -31,6 +32,27 @@ def test_a_table_is_written_as_it_was(tmp_path: Path, text: str) -> None:
     out = io.BytesIO()
     write_table(read(tmp_path / "rows.csv", text), out)
     assert out.getvalue().decode() == text
+
+
+@pytest.mark.parametrize("text", TABLES)
+def test_plain_columns_hold_the_same_in_si(tmp_path: Path, text: str) -> None:
+    motion = read(tmp_path / "rows.csv", text)
+    out = io.BytesIO()
+    write_table(replace(motion, columns=plain_columns(motion)), out)
+    names, *rows = out.getvalue().decode().splitlines()
+    given, *cells = text.splitlines()
+    degrees = {name.split("_")[0]: math.radians(1.0) for name in given.split(",") if name.endswith("_deg")}
+    times = {"t_ms": 1e-3, "time_ms": 1e-3}
+    said = {}
+    for index, name in enumerate(given.split(",")):
+        plain = name.split("_")[0].replace("time", "t")
+        factor = times.get(name, degrees.get(plain, 1.0))
+        said[plain] = [float(line.split(",")[index]) * factor for line in cells]
+    assert sorted(names.split(",")) == sorted(said)
+    assert names.split(",") == [n for n in ("t", "q1", "q2", "qd1", "tau1", "move") if n in said]
+    for index, name in enumerate(names.split(",")):
+        found = [float(line.split(",")[index]) for line in rows]
+        np.testing.assert_allclose(found, said[name], rtol=0, atol=0.6e-9)
 
 
 @pytest.mark.parametrize("exact", [("q",), ("qd",), ("t", "q", "qd")])

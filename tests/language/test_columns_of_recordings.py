@@ -49,18 +49,18 @@ def test_columns_say_joint_and_unit_whatever_the_units_of_the_job(
 def test_beside_columns_of_joints_those_of_the_tool_are_not_joints_of_such_names(tmp_path: Path) -> None:
     rows = "q1,q2,x,y\n1,2,8,9\n3,4,8,9\n"
     assert recorded(tmp_path, rows, SLIDES).positions.tolist() == [[1, 2], [3, 4]]
-    with pytest.raises(InputError, match="two columns for x: x and x_mm"):
+    with pytest.raises(InputError, match="x_mm and x are columns of the same joint"):
         recorded(tmp_path, "x,x_mm,y\n1,2,3\n", SLIDES)
     alone = "x_mm,y\n8,9\n7,6\n"
     assert recorded(tmp_path, alone, SLIDES).positions.tolist() == [[0.008, 9], [0.007, 6]]
 
 
 WRONG = [
-    ("q1_mm,q2", "1,2", "the column q1_mm is in mm, but turn is revolute", "call it q1 (SI) or ..._deg"),
-    ("q1,q2_deg", "1,2", "the column q2_deg is in deg, but lift is prismatic", "call it q2 (SI) or ..._mm"),
-    ("q1,x", "1,2", "no column for lift", "call it q2 (SI) or q2_mm"),
-    ("q2,x", "1,2", "no column for turn", "call it q1 (SI) or q1_deg"),
-    ("q1,turn,q2", "1,2,3", "two columns for turn: q1 and turn", None),
+    ("q1_mm,q2", "1,2", "q1_mm cannot be in mm: turn is revolute", "expected q1 or q1_deg"),
+    ("q1,q2_deg", "1,2", "q2_deg cannot be in deg: lift is prismatic", "expected q2 or q2_mm"),
+    ("q1,x", "1,2", "there is no column q2", "columns are called q1 in SI"),
+    ("q2,x", "1,2", "there is no column q1", "columns are called q1 in SI"),
+    ("q1,turn,q2", "1,2,3", "turn and q1 are columns of the same joint", "leave one out"),
     ("q1,q2,q3", "1,2,3", "q3 is the column of joint 3, robot has 2", None),
     ("q1,q2,q4_deg", "1,2,3", "q4_deg is the column of joint 4, robot has 2", None),
     ("q1,q2", "1,-2e12", "a value is larger than 1e+12 rad or m", "check its exponent and unit"),

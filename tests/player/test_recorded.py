@@ -95,11 +95,12 @@ def test_waypoints_stand_where_moves_meet_and_at_the_ends_of_the_file(tmp_path: 
     [
         ("t,q1,q2\n0,0,0\n1,0,0\n1,0,0\n", "row 2 (from 0): the time 1 s follows 1 s"),
         ("t,q1,q2\n0,0,0\n3,0,0\n2.5,0,0\n", "row 2 (from 0): the time 2.5 s follows 3 s"),
-        ("t,q1,q2_deg\n0,0,0\n", "the column 'q2_deg' of rows.csv is no length, and j2 is prismatic"),
-        ("t,q1_mm,q2\n0,0,0\n", "the column 'q1_mm' of rows.csv is no angle, and j1 is revolute"),
-        ("t,q1,q2,qd2_deg,qd1\n0,0,0,0,0\n", "the column 'qd2_deg' of rows.csv is no length"),
+        ("t,q1,q2_deg\n0,0,0\n", "q2_deg cannot be in deg: j2 is prismatic"),
+        ("t,q1_mm,q2\n0,0,0\n", "q1_mm cannot be in mm: j1 is revolute"),
+        ("t,q1,q2,qd2_deg,qd1\n0,0,0,0,0\n", "qd2_deg cannot be in deg: j2 is prismatic"),
         ("t,q1,q2\n0,0,1e30\n", "got 1e+30"),
-        ("t,q1\n0,0\n", "has the joint columns q1, expected q1 to q2 of arm, once each"),
+        ("t,q1\n0,0\n", "arm has 2 joints, and there is no column q2"),
+        ("t,q0,q1\n0,0,0\n", "q0: joints are counted from 1"),
         ("q1,q2\n0,0\n", "has no column 't'"),
     ],
 )

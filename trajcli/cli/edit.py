@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from trajcli.cli.outcome import print_remark
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.operations import cut, join, resample, reverse
 from trajcli.editing.requirements import kept_limits, new_jumps, worst_deviation
-from trajcli.editing.writing import as_read, write_motion
+from trajcli.editing.writing import as_read, plain_columns, write_motion
 from trajcli.errors import InputError, VerificationError
 from trajcli.streams.formats import format_of
 from trajcli.streams.whole_file import refuse_overwriting
@@ -104,7 +105,9 @@ def run_convert(options: ConvertCommand) -> int:
         TrajcliError: When anything is wrong; then nothing was written.
     """
     _check_output([options.file], options)
-    motion = _read(options.file, options)
+    motion = _read(options.file, options, si=options.si)
+    if options.si:
+        motion = replace(motion, columns=plain_columns(motion))
     _write(motion, options)
     _say(options, f"{motion.rows.source}: converted, {_extent(motion)}")
     return 0
@@ -177,9 +180,9 @@ def _edited(
     return 0
 
 
-def _read(source: str, options: EditCommand) -> EditedMotion:
-    """Return the motion of a file, whose units do not matter where its format stays."""
-    units = None if format_of(options.output, options.form).si else Units()
+def _read(source: str, options: EditCommand, *, si: bool = False) -> EditedMotion:
+    """Return the motion of a file, whose units do not matter where its columns stay."""
+    units = None if si or format_of(options.output, options.form).si else Units()
     return read_motion(source, options.part(ReadingOptions), declared=units)
 
 

@@ -197,6 +197,7 @@ class ConvertCommand(EditCommand):
     example = "trajcli convert rows.csv -o rows.mcap"
 
     file: MotionSource
+    si: Annotated[bool, option("--si", "Of a CSV too: columns t, q1, q2, ... in rad and m.")] = False
 
 
 COMMANDS: tuple[type[CommandLine], ...] = (

@@ -72,7 +72,7 @@ def as_read(motion: EditedMotion, path: str | None, form: FormatName | None = No
 
 
 def _table_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
-    return motion.columns if motion.format == "csv" else _plain_columns(motion)
+    return motion.columns if motion.format == "csv" else plain_columns(motion)
 
 
 def write_table(motion: EditedMotion, out: BinaryIO) -> None:
@@ -104,9 +104,13 @@ def _encoded(block: Array, decimals: list[int | None]) -> bytes:
     return "".join(line % tuple(row) for row in cells.tolist()).encode()
 
 
-def _plain_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
-    """Return the columns of trajcli's own language, in SI, for a file that has none; decimals are kept."""
-    given = {(column.quantity, column.joint): column.decimals for column in motion.columns}
+def plain_columns(motion: EditedMotion) -> tuple[WrittenColumn, ...]:
+    """Return the columns of trajcli's own language, in SI; decimals are kept, or those of a plan."""
+    given = {
+        (column.quantity, column.joint): column.decimals
+        for column in motion.columns
+        if column.factor == 1.0 or (column.decimals or 0) > DECIMALS
+    }
 
     def column(name: str, quantity: str, joint: int | None) -> WrittenColumn:
         decimals = given.get((quantity, joint))

@@ -12,7 +12,7 @@ from trajcli.columns import GROUPS, Column, group_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Problem, TrajcliError
 from trajcli.geometry.rotation import matrix_from_quaternion
-from trajcli.job.files.recorded_values import joint_columns, refuse_large, unit_quaternions
+from trajcli.job.files.recorded_values import joint_values, refuse_large, unit_quaternions
 from trajcli.job.messages import validated
 from trajcli.job.yaml.document import Document
 from trajcli.job.yaml.load import read_document
@@ -98,7 +98,7 @@ def read_configurations(path: str, robot: Robot, units: Units) -> Array:
         FileError: When it cannot be read.
     """
     if not path.lower().endswith(_YAML):
-        return joint_columns(read_csv(path), robot)
+        return joint_values(read_csv(path), robot)
 
     def joints(item: Any, document: Document, index: int, context: ReadingContext) -> Any:  # noqa: ANN401
         return validated(ConfigurationSpec, item, document, context, (index,)).joints
@@ -216,7 +216,7 @@ def _flaws_of_deviations(
 def _from_table(table: Table, robot: Robot) -> Measurements:
     columns = {name: parse_column(name) for name in table.names}
     _refuse_unknown(table, columns, robot)
-    joints = joint_columns(table, robot)
+    joints = joint_values(table, robot)
     numbered = {robot.joint_names[c.joint or 0] for c in columns.values() if c.kind == "q"}
     for name, column in columns.items():
         if column.kind in {*_AXES} & {*robot.joint_names} - numbered:

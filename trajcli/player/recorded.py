@@ -29,10 +29,11 @@ from trajcli.player.scene import (
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.forward import refuse_far
 from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.joint_columns import CONVERTED, JointColumns, joint_columns, refuse_zero
 from trajcli.streams.reading import read_table
 from trajcli.streams.table import Table
 from trajcli.trajectory import Trajectory
-from trajcli.units import AngleUnit, LengthUnit, Units, amount_text, joint_quantity
+from trajcli.units import AngleUnit, LengthUnit, Units, amount_text
 from trajcli.version import __version__
 
 _NO_ROBOT = "A file of joint values says nothing of the arm: name it with --robot to see it move."
@@ -141,7 +142,8 @@ def _times(table: Table) -> Array:
     """Return the times (N,), s."""
     if "t" not in table.names:
         raise InputError(
-            f"{table.file} has no column 't'", hint=f"its columns are {', '.join(table.names[:12])}"
+            f"{table.file} has no column 't'",
+            hint=f"its columns are {', '.join(table.names[:12])}; {CONVERTED}",
         )
     times = table.column("t")
     wrong = np.flatnonzero(np.diff(times) <= 0)
@@ -158,49 +160,32 @@ def _of_kind(columns: Sequence[Column], kind: str) -> list[Column]:
 
 def _joint_values(table: Table, columns: Sequence[Column], robot: Robot | None) -> dict[str, Array]:
     """Return the positions, and what derivatives the file has of all joints, each (N, n), SI."""
-    joints = _joint_count(table, columns, robot)
+    refuse_zero(table.names, table.file)
+    count = _joint_count(table, columns) if robot is None else len(robot.joints)
     values = {}
     for name in (*ORDERS, EFFORT):
         found = _of_kind(columns, name)
-        if [column.joint for column in found] == list(range(joints)):
-            if robot is not None and name != EFFORT:
-                _check_units(table, found, robot)
-            values[name] = _values(table, found)
+        whole = [column.joint for column in found] == list(range(count))
+        if robot is not None and (whole or name == "q"):
+            values[name] = joint_columns(robot, table.names, table.file, name).values(table.columns)
+        elif whole:
+            indices = np.array([table.names.index(column.name) for column in found])
+            factors = np.array([column.factor for column in found])
+            values[name] = JointColumns(None, indices, factors, []).values(table.columns)
     refuse_far(values["q"], table.file)
     return values
 
 
-def _values(table: Table, columns: Sequence[Column]) -> Array:
-    """Return columns of a file in SI, (N, n): without a copy where they stand so in it."""
-    first, factors = table.names.index(columns[0].name), {column.factor for column in columns}
-    names = table.names[first : first + len(columns)]
-    if factors == {1.0} and names == tuple(column.name for column in columns):
-        return table.columns[:, first : first + len(columns)]
-    return np.stack([table.column(column.name) * column.factor for column in columns], axis=1)
-
-
-def _joint_count(table: Table, columns: Sequence[Column], robot: Robot | None) -> int:
+def _joint_count(table: Table, columns: Sequence[Column]) -> int:
     """Return the number of joints, whose positions the file must hold."""
     found = _of_kind(columns, "q")
-    numbers = [column.joint for column in found]
-    count = len(found) if robot is None else len(robot.joints)
-    if numbers != list(range(count)) or not count:
-        wanted = "q1, q2, ..." if robot is None else f"q1 to q{count} of {robot.name}, once each"
+    if [column.joint for column in found] != list(range(len(found))) or not found:
         listed = ", ".join(column.name for column in found) or "none"
         raise InputError(
-            f"{table.file} has the joint columns {listed}, expected {wanted}",
-            hint=f"its columns are {', '.join(table.names[:12])}",
+            f"{table.file} has the joint columns {listed}, expected q1, q2, ...",
+            hint=f"its columns are {', '.join(table.names[:12])}; {CONVERTED}",
         )
-    return count
-
-
-def _check_units(table: Table, columns: Sequence[Column], robot: Robot) -> None:
-    """Refuse degrees of a prismatic joint, and millimetres of a revolute one."""
-    for column, kind, name in zip(columns, robot.joint_types, robot.joint_names, strict=True):
-        dimension = joint_quantity(kind).dimension
-        if column.quantity is not None and column.quantity.dimension != dimension:
-            text = f"the column '{column.name}' of {table.file} is no {dimension}, and {name} is {kind}"
-            raise InputError(text, hint=f"name another robot than {robot.name}, or another column")
+    return len(found)
 
 
 def _joints(columns: Sequence[Column], robot: Robot | None, units: Units) -> list[dict[str, Any]]:

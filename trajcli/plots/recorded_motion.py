@@ -18,6 +18,7 @@ from trajcli.limits.kinds import JOINT_KINDS, SPEED_KINDS
 from trajcli.plots.choice import JOINT_QUANTITIES
 from trajcli.plots.display_units import DisplayUnits
 from trajcli.plots.panel import NO_POINTS
+from trajcli.streams.joint_columns import CONVERTED, refuse_zero
 from trajcli.streams.table import Table
 from trajcli.trajectory import Trajectory
 
@@ -32,11 +33,12 @@ def columns_of_table(table: Table) -> tuple[Column, ...]:
     """Return what the columns of a file are.
 
     Raises:
-        InputError: When none is the time.
+        InputError: When none is the time, or joints are counted from zero.
     """
+    refuse_zero(table.names, table.file)
     columns = tuple(map(parse_column, table.names))
     if not any(column.kind == "t" and column.joint is None for column in columns):
-        hint = f"it has {', '.join(table.names[:12])}"
+        hint = f"it has {', '.join(table.names[:12])}; {CONVERTED}"
         raise InputError(f"{table.file} has no column t, over which it could be plotted", hint=hint)
     return columns
 

@@ -11,8 +11,9 @@ from trajcli.columns import EFFORT, Group, columns_of, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.dynamics.newton_euler import InverseDynamics
 from trajcli.queries.arm import ArmInUnits, LimitWatch
-from trajcli.queries.forward import JointColumns, Stream, joint_columns, refuse_far
+from trajcli.queries.forward import Stream, refuse_far
 from trajcli.queries.pose import plain
+from trajcli.streams.joint_columns import JointColumns, joint_columns
 from trajcli.streams.table import TableBlocks
 
 _RATES = ("qd", "qdd")
@@ -58,9 +59,10 @@ def efforts_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = No
             taken, if a row is wrong.
     """
     dynamics = InverseDynamics(arm.robot)
-    inputs = joint_columns(arm.robot, rows)
+    names, file = rows.names, rows.file
+    inputs = joint_columns(arm.robot, names, file)
     missing = left_out(rows)
-    rates = [None if kind in missing else joint_columns(arm.robot, rows, kind) for kind in _RATES]
+    rates = [None if kind in missing else joint_columns(arm.robot, names, file, kind) for kind in _RATES]
     groups: tuple[Group, ...] = (EFFORT,) if inputs.time is None else ("t", EFFORT)
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
     return Stream(columns, _efforts(dynamics, rows, inputs, rates, watch))

@@ -6,19 +6,18 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajcli.columns import Column, Group, columns_of, kinds_of, parse_column
 from trajcli.curves.piecewise import Array
-from trajcli.errors import InputError, Place, Problem
+from trajcli.errors import InputError
 from trajcli.geometry.rotation import quaternion_from_matrix, without_jumps
 from trajcli.kinematics.dexterity import dexterity
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import ReferenceFrame, jacobian
-from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import LARGEST_POSITION
 from trajcli.queries.arm import ArmInUnits, LimitWatch
 from trajcli.streams.decimals import DECIMALS
+from trajcli.streams.joint_columns import JointColumns, joint_columns
 from trajcli.streams.table import TableBlocks
 
 _HALF = 0.5 * 10.0**-DECIMALS  # a joint that rests at its limit may be rounded beyond it
@@ -34,23 +33,6 @@ class Stream(NamedTuple):
 
     columns: tuple[Column, ...]
     blocks: Iterator[Array]
-
-
-class JointColumns(NamedTuple):
-    """Index of the time's column, and index, SI per unit and unit of each joint's column."""
-
-    time: int | None
-    joints: NDArray[np.intp]
-    factors: Array
-    units: list[str]
-
-    def times(self, block: Array) -> Array:
-        """Return the times (N, 1), or (N, 0) where there are none."""
-        return block[:, :0] if self.time is None else block[:, [self.time]]
-
-    def values(self, block: Array) -> Array:
-        """Return joint values (N, n), rad or m."""
-        return np.asarray(block[:, self.joints] * self.factors)
 
 
 def refuse_far(values: Array, file: str) -> None:
@@ -83,7 +65,7 @@ def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None
     Raises:
         InputError: When a joint has no column, or one of another unit; when taken, if a row is wrong.
     """
-    inputs = joint_columns(arm.robot, rows)
+    inputs = joint_columns(arm.robot, rows.names, rows.file)
     groups: tuple[Group, ...] = ("pose",) if inputs.time is None else ("t", "pose")
     columns = columns_of(groups, arm.robot.joint_types, arm.units)
     return Stream(columns, _poses(arm, rows, inputs, watch))
@@ -93,8 +75,8 @@ def _poses(
     arm: ArmInUnits, rows: TableBlocks, inputs: JointColumns, watch: LimitWatch | None
 ) -> Iterator[Array]:
     last = None
-    places = {column.kind: (i, column.factor) for i, column in enumerate(map(parse_column, rows.names))}
-    axes = [places[axis] for axis in "xyz"] if places.keys() >= {*kinds_of("pose")} else []
+    found = {column.kind: (i, column.factor) for i, column in enumerate(map(parse_column, rows.names))}
+    axes = [found[axis] for axis in "xyz"] if found.keys() >= {*kinds_of("pose")} else []
     for block in rows.blocks:
         q = inputs.values(block)
         refuse_far(q, rows.file)
@@ -130,7 +112,7 @@ def jacobians_of(
     Raises:
         InputError: As `poses_of`.
     """
-    inputs = joint_columns(arm.robot, rows)
+    inputs = joint_columns(arm.robot, rows.names, rows.file)
     entries = [f"J{i}{j}" for i in range(1, 7) for j in range(1, len(arm.robot.joints) + 1)]
     time = [] if inputs.time is None else ["t"]
     columns = map(parse_column, [*time, "manipulability", "inverse_condition", *entries])
@@ -153,58 +135,3 @@ def _jacobians(
         entries = jacobian(arm.robot, q, frame).reshape(len(q), -1)
         columns = np.stack([measures.manipulability, 1.0 / measures.condition], axis=1)
         yield np.hstack([inputs.times(block), columns, entries])
-
-
-def joint_columns(robot: Robot, rows: TableBlocks, kind: str = "q") -> JointColumns:
-    """Return where the values of the joints stand, or derivatives of them.
-
-    Args:
-        robot: With n joints.
-        rows: A file.
-        kind: "q", "qd" or "qdd".
-
-    Raises:
-        InputError: When a joint has no such column, or one of another unit.
-    """
-    by_joint: dict[int, tuple[int, Column]] = {}
-    time = None
-    for index, name in enumerate(rows.names):
-        column = parse_column(name)
-        if column.kind == "t" and column.unit is None:
-            time = index
-        if column.kind != kind or column.joint is None:
-            continue
-        flaw = _flaw(robot, column, by_joint)
-        if flaw:
-            start = len(",".join(rows.names[:index])) + (2 if index else 1)
-            place = Place(rows.file, 1, start, ",".join(rows.names), len(name))
-            raise InputError(Problem(*flaw, place))
-        by_joint[column.joint] = index, column
-    missing = [f"{kind}{i + 1}" for i in range(len(robot.joints)) if i not in by_joint]
-    if missing:
-        place = Place(rows.file, 1, 1, ",".join(rows.names))
-        message = f"{robot.name} has {len(robot.joints)} joints, and there is no column {', '.join(missing)}"
-        hint = f"columns are called {kind}1 in SI, {kind}1_deg or {kind}1_mm otherwise"
-        raise InputError(Problem(message, hint, place))
-    columns = [by_joint[i] for i in range(len(robot.joints))]
-    indices = np.array([index for index, _ in columns])
-    si = ["m" if kind == "prismatic" else "rad" for kind in robot.joint_types]
-    units = [column.unit or plain for (_, column), plain in zip(columns, si, strict=True)]
-    return JointColumns(time, indices, np.array([column.factor for _, column in columns]), units)
-
-
-def _flaw(
-    robot: Robot, column: Column, by_joint: dict[int, tuple[int, Column]]
-) -> tuple[str, str | None] | None:
-    joint = column.joint or 0
-    count = len(robot.joints)
-    if joint >= count:
-        return f"{column.name} is the column of joint {joint + 1}, {robot.name} has {count} joints", None
-    if joint in by_joint:
-        return f"{column.name} and {by_joint[joint][1].name} are columns of the same joint", "leave one out"
-    kind = robot.joint_types[joint]
-    unit = "mm" if kind == "prismatic" else "deg"
-    if column.unit not in (None, unit):
-        message = f"{column.name} cannot be in {column.unit}: {robot.joint_names[joint]} is {kind}"
-        return message, f"expected {column.kind}{joint + 1} or {column.kind}{joint + 1}_{unit}"
-    return None

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from trajcli.columns import Column, parse_column
 from trajcli.curves.piecewise import Array
 from trajcli.errors import FileError, InputError, Problem
 from trajcli.job.yaml.load import Document
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import LARGEST_POSITION, FlawError
 from trajcli.language.recorded import Recorded, RecordedPoses
+from trajcli.streams.joint_columns import joint_columns
 from trajcli.streams.table import Table, read_csv
 
 _OF_TIME = re.compile(r"(ts?|time|(time)?stamp|secs?|seconds)([ _\[(].*)?")
@@ -60,7 +60,7 @@ def placed_text(problem: Problem) -> str:
 
 
 def _recorded(table: Table, robot: Robot) -> Recorded:
-    positions = joint_columns(table, robot)
+    positions = joint_values(table, robot)
     if "t" not in table.names:
         _refuse_other_times(table)
         return Recorded(positions, file=table.file)
@@ -76,21 +76,13 @@ def _recorded(table: Table, robot: Robot) -> Recorded:
     return Recorded(positions, times, table.file)
 
 
-def joint_columns(table: Table, robot: Robot) -> Array:
+def joint_values(table: Table, robot: Robot) -> Array:
     """Return the values of all joints (N, n), rad or m, from columns such as q1, q2_deg or a joint's name.
 
     Raises:
-        InputError: When a joint has no column or two, one of another unit, or a value that no robot has; or
-            when there is a column of a joint beyond the last.
+        InputError: When columns of joints are not as they should be, or hold a value that no robot has.
     """
-    present = [(name, column) for name in table.names if (column := _column(name, robot)) is not None]
-    for name, column in present:
-        if (column.joint or 0) >= len(robot.joints):
-            text = f"{table.file}: {name} is the column of joint {(column.joint or 0) + 1}"
-            raise InputError(f"{text}, {robot.name} has {len(robot.joints)}")
-    positions = np.empty((len(table.columns), len(robot.joints)))
-    for joint in range(len(robot.joints)):
-        positions[:, joint] = _joint(table, robot, joint, present)
+    positions = joint_columns(robot, table.names, table.file).values(table.columns)
     refuse_large(positions, table)
     positions.flags.writeable = False  # who keeps it takes it without a copy
     return positions
@@ -115,38 +107,6 @@ def _refuse_other_times(table: Table) -> None:
             f"{table.file}: times stand in the column t, in s; this file has '{other}'",
             hint="call it t, with its values in s; or remove it: times are then found from the limits",
         )
-
-
-def _joint(table: Table, robot: Robot, joint: int, present: list[tuple[str, Column]]) -> Array:
-    """Return the values of a joint, rad or m, from the known columns of joints."""
-    name, kind = robot.joint_names[joint], robot.joint_types[joint]
-    unit = "mm" if kind == "prismatic" else "deg"
-    candidates = [each for each in present if each[1].joint == joint]
-    if len(candidates) > 1:  # beside q1 a column x is the tool's, whatever joints are called
-        own = [each for each in candidates if parse_column(each[0]).kind not in _LENGTHS]
-        candidates = own or candidates
-    if not candidates:
-        hint = f"call it q{joint + 1} (SI) or q{joint + 1}_{unit}"
-        raise InputError(f"{table.file}: no column for {name}", hint=hint)
-    if len(candidates) > 1:
-        raise InputError(f"{table.file}: two columns for {name}: {candidates[0][0]} and {candidates[1][0]}")
-    header, column = candidates[0]
-    if column.unit not in (None, unit):
-        raise InputError(
-            f"{table.file}: the column {header} is in {column.unit}, but {name} is {kind}",
-            hint=f"call it {header.removesuffix(f'_{column.unit}')} (SI) or ..._{unit}",
-        )
-    return np.asarray(table.column(header) * column.factor)
-
-
-def _column(name: str, robot: Robot) -> Column | None:
-    """Return the column of a joint's values: q1, or the joint's name, with or without a unit."""
-    column = parse_column(name)
-    if column.kind == "q":
-        return column
-    if column.kind in robot.joint_names:
-        return Column("q", robot.joint_names.index(column.kind), column.unit)
-    return None
 
 
 _LENGTHS, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
