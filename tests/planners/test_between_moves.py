@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from trajcli.errors import TrajcliError
+from trajcli.errors import PlanningError, TrajcliError
 from trajcli.job.read import job_from_text
 from trajcli.planning.plan import Plan, plan_job
 
@@ -172,6 +172,18 @@ def test_an_arm_that_moves_is_not_held() -> None:
     made = planned(MOVE, hold)
     assert made.moves[1].duration == 1.5
     assert made.trajectory.curve.evaluate(np.array([2.0, 2.7, 3.5])).tolist() == [[0.3, 0.6]] * 3
+
+
+def test_a_hold_begins_without_acceleration() -> None:
+    """What the move before it ends with is not its own: it joins positions and velocities."""
+    bent = {**MOVE, "to": {"joints": [0.3, 0.6], "acceleration": [0.0, 0.1]}}
+    made = planned(bent, {"planner": "hold", "duration": 1.5})
+    assert made.moves[0].planned.end.acceleration.tolist() == [0.0, 0.1]
+    assert made.moves[1].start.at_rest
+    assert made.verdict.passed
+    move, start = made.moves[1], made.moves[0].planned.end
+    with pytest.raises(PlanningError, match="hold starts at rest, but the acceleration of"):
+        move.planner.plan(start, move.robot)
 
 
 def test_a_move_to_a_pose_starts_from_where_the_arm_stands() -> None:

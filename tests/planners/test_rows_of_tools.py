@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from trajcli.curves.piecewise import Array, Side
-from trajcli.curves.time_optimal.time_law import law_pieces
+from trajcli.curves.time_optimal.time_law import LawPieces, law_pieces
 from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.planners.tool_constraint import ToolConstraint
@@ -169,9 +169,12 @@ def test_chords_and_turns_take_as_long_as_at_the_larger_limits_of_both_their_end
         limits = ToolLimits(speed=speed, angular_speed=angular)
         expected = np.maximum(chords / speed, turns / angular)
         np.testing.assert_allclose(ToolConstraint(tool, limits).shortest(GRID), expected, rtol=1e-9)
-    steps = SpeedLimits(np.array([0.0, 0.3125, 1.0]), (0, 1, 2), np.array([0.1, 0.4]), np.array([50.0, 50.0]))
-    stepping = ToolConstraint(tool, ToolLimits(speed=7.0), steps).shortest(GRID)
-    np.testing.assert_allclose(stepping, chords / np.where(GRID[1:] < 0.3125, 0.1, 0.4), rtol=1e-9)
+    for first, second in ((0.1, 0.4), (0.4, 0.1)):
+        both = np.array([first, second]), np.array([50.0, 50.0])
+        steps = SpeedLimits(np.array([0.0, 0.3125, 1.0]), (0, 1, 2), *both)
+        stepping = ToolConstraint(tool, ToolLimits(speed=7.0), steps).shortest(GRID)
+        fastest = np.where(GRID[1:] < 0.3125, first, np.where(GRID[:-1] > 0.3125, second, 0.4))
+        np.testing.assert_allclose(stepping, chords / fastest, rtol=1e-9)
 
 
 def test_speeds_that_step_have_two_sides() -> None:
@@ -209,3 +212,10 @@ def test_a_deceleration_is_one_of_the_law(oblique: bool) -> None:
 )
 def test_any_acceleration_bounds_the_law(limits: ToolLimits, deceleration: float, bounded: bool) -> None:
     assert ToolConstraint(Screwed(), limits, deceleration=deceleration).bounds_sdd == bounded
+
+
+def test_what_a_piece_uses_between_its_ends_counts() -> None:
+    """With s = 3 t^2 - 2 t^3 the speed is 1.5 in the middle, and zero at both ends."""
+    law = LawPieces(np.array([1.0]), np.array([[-2.0], [3.0], [0.0], [0.0]]))
+    found = ToolConstraint(Screwed(), ToolLimits(speed=0.4)).excess(law)[0]
+    assert 0.95 <= float(found[0]) / (1.5 * np.hypot(0.3, 0.2) / 0.4) <= 1 + 1e-9

@@ -235,3 +235,34 @@ def test_what_a_target_leaves_free_is_held_up_to_where_the_arm_would_turn_round(
         assert fixed[1] > 1e-2 * fixed[0]
         ratios.append(every[1] / every[0])
     assert ratios[1] < 0.05 * ratios[0]
+
+
+def test_rates_are_those_of_time_where_the_law_is_known() -> None:
+    """A tenth of a micrometre beside the hole of the workspace."""
+    start = {"xyz": [0.5, 0.2000001, 0], "configuration": UP}
+    problem = problem_of(HOLLOW, start, straight(-0.5, 0.2000001))
+    _, unit, per = said(problem, r"would have to go (\S+) (\S+) for each ([^(]+) \(smallest")
+    assert (unit, per) == ("rad", "s")
+
+
+def test_rates_of_a_tool_that_turns_in_its_place_are_for_each_angle() -> None:
+    """To where the wrist is at the edge of its reach: there the elbow races."""
+    robot = {"convention": "standard", "joints": [{"a": 0.5}, {"a": 0.4}, {"a": 0.3}]}
+    edge = float(np.arccos((1 + 0.3**2 - 0.9**2) / (2 * 0.3)))
+    start = {"xyz": [1.0, 0, 0], "yaw": 0, "tool_axis": "x", "configuration": UP}
+    to = {"xyz": [1.0, 0, 0], "yaw": edge, "tool_axis": "x"}
+    problem = problem_of(robot, start, line(to, law=LAW))
+    place, rate, unit, per = said(
+        problem, r"s = (\S+) rad: there \S+ would have to go (\S+) (\S+) for each ([^(]+) \(smallest"
+    )
+    assert (unit, per) == ("rad", "rad of the path")
+    assert float(place) == pytest.approx(edge, rel=1e-4)
+    assert float(rate) > 20
+
+
+def test_branches_meet_where_no_joint_races() -> None:
+    """An arm that is stretched out cannot say to which side it is to bend."""
+    lift = {"type": "prismatic", "alpha": np.pi / 2}
+    robot = {"convention": "standard", "joints": [lift, {"a": 2.0}]}
+    problem = problem_of(robot, {"joints": [0, 0]}, line({"xyz": [1, 0, 0]}, law=LAW))
+    assert "at s = 0 m: there branches of the arm meet" in problem.message

@@ -216,3 +216,32 @@ def test_a_path_has_its_points_as_far_off_as_the_motion() -> None:
     np.testing.assert_array_equal(course.passed.points, [each["joints"] for each in POINTS[:2]])
     with pytest.raises(PlanningError, match="no path to follow"):
         planner.course(np.zeros(3), plan.loaded.robot, replace(planned, via_points=None))
+
+
+@pytest.mark.parametrize(
+    ("fields", "point", "said"),
+    [
+        ({}, {"velocity": {"turn": 50}}, "turn goes to 60.125 deg, beyond 58.5 deg"),
+        ({"straight": True}, {"velocity": {"turn": 50, "other": 20}}, "velocity 50 deg/s of turn"),
+        ({"straight": True}, {"velocity": {"turn": 57, "other": 5}}, "turn has velocity 57 deg/s"),
+    ],
+)
+def test_numbers_of_joints_behind_one_that_rests_have_their_own_units(
+    fields: dict[str, object], point: dict[str, object], said: str
+) -> None:
+    """Braking from 50 deg/s with 400 deg/s^2 and 4000 deg/s^3 takes 3.125 deg, from 57 deg on."""
+    assert 57 + 50**2 / (2 * 400) == 60.125
+    slide = {"name": "slide", "type": "prismatic"}
+    turn = {"name": "turn"} if fields else {"name": "turn", "position": [0, 58.5]}
+    through = [{"joints": [100, 57, 5], **point}, {"joints": [100, 10, 10]}]
+    made = {
+        "version": 1,
+        "units": {"angle": "deg", "length": "mm"},
+        "robot": {"joints": [slide, turn, {"name": "other"}]},
+        "limits": {"velocity": 100, "acceleration": 400, "jerk": 4000},
+        "start": {"joints": [100, 0, 0]},
+        "moves": [{"planner": "waypoints", "through": through, **fields}],
+    }
+    with pytest.raises(TrajcliError) as caught:
+        trajcli.plan(made)
+    assert said in caught.value.problems[0].text()

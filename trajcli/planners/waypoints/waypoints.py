@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import MissingLimitError, PlanningError, Problem
+from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.numbers import (
@@ -189,11 +189,14 @@ class FastestThroughPoints(PointSequence):
         joints = np.flatnonzero(points.moving)
         problem = _problem(points, robot, joints)
         names = [robot.joint_names[joint] for joint in joints.tolist()]
-        if self.straight:
-            fastest = straight_only(problem, names, self.starts)
-        else:
-            states = None if self._begun is None else self._begun[:, joints]
-            fastest = fastest_motion(problem, names, self.starts, states)
+        states = None if self._begun is None else self._begun[:, joints]
+        try:
+            if self.straight:
+                fastest = straight_only(problem, names, self.starts)
+            else:
+                fastest = fastest_motion(problem, names, self.starts, states)
+        except PlanningError as error:
+            raise PlanningError(*(_of_robot(each, joints) for each in error.problems)) from None
         motion = fastest.motion.among(joints, points.positions[0])
         off, times = off_chords(motion, points.positions, robot.limits.velocity)
         joint = None if fastest.joint is None else int(joints[fastest.joint])
@@ -232,6 +235,17 @@ class FastestThroughPoints(PointSequence):
             message = f"{len(least)} minimum durations, but the recorded points make {wanted} segments"
             raise PlanningError(message, hint="give one for each segment, the first from the start")
         return given_points(start, recorded, list(zip(paths, listed, strict=True)), least)
+
+
+def _of_robot(problem: Problem, joints: NDArray[np.intp]) -> Problem:
+    """Return the problem with amounts of joints of the robot, which were numbered among those that move."""
+    amounts = {
+        name: replace(each, joint=int(joints[each.joint]))
+        if isinstance(each, Amount) and each.joint is not None
+        else each
+        for name, each in problem.amounts.items()
+    }
+    return replace(problem, amounts=amounts)
 
 
 def _has_rates(point: Waypoint, *, of_zero: bool) -> bool:

@@ -1,0 +1,101 @@
+"""What a time-optimal motion says of itself: stops and their times, ends, bounds, and its law beside its trajectory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from topp_paths import over, polyline, random_bounds, spline, symmetric
+
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.time_optimal import parameterization
+from trajcli.curves.time_optimal.constraints import JointConstraint
+from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
+
+FROM_REST = 2 * np.sqrt([0.3, 0.3, 0.4])  # over these distances, at 1 m/s^2
+
+
+def test_stops_are_those_asked_for_and_the_corners_each_at_its_time() -> None:
+    path = polyline([[0.0], [0.3], [0.6], [0.2]], [0.0, 0.3, 0.6, 1.0])
+    found = time_optimal(path, symmetric(9.0), symmetric(1.0), stops=[0.3])
+    assert found.stops.tolist() == [0.3, 0.6]
+    np.testing.assert_allclose(found.stop_times, np.cumsum(FROM_REST)[:2], rtol=1e-4)
+    assert found.trajectory.duration == pytest.approx(FROM_REST.sum(), rel=1e-4)
+    np.testing.assert_allclose(found.law.evaluate(found.stop_times)[:, 0], found.stops, atol=1e-9)
+    np.testing.assert_allclose(found.law.evaluate(found.stop_times, 1), 0.0, atol=1e-6)
+    assert 0.999 * FROM_REST.sum() <= found.lower_bound <= found.trajectory.duration
+
+
+def test_each_end_has_its_speed() -> None:
+    path = polyline([[0.0], [1.0]])
+    found = time_optimal(path, symmetric(0.9), symmetric(1.0), start_velocity=0.5, end_velocity=0.2)
+    rates = [float(found.law.evaluate(t, 1)[0]) for t in (0.0, found.law.end)]
+    assert rates == [pytest.approx(0.5), pytest.approx(0.2)]
+    cruise = 1.0 - (0.9**2 - 0.5**2) / 2 - (0.9**2 - 0.2**2) / 2
+    assert found.trajectory.duration == pytest.approx(0.4 + 0.7 + cruise / 0.9, rel=1e-4)
+
+
+@pytest.mark.parametrize("speed", [-0.1, np.nan, np.inf])
+@pytest.mark.parametrize("end", ["start_velocity", "end_velocity"])
+def test_speeds_of_both_ends_are_finite_and_not_negative(end: str, speed: float) -> None:
+    with pytest.raises(ValueError, match="must be finite, not negative"):
+        time_optimal(polyline([[0.0], [1.0]]), symmetric(1.0), symmetric(1.0), **{end: speed})
+
+
+def test_a_speed_where_the_path_stands_still_is_kept_if_it_is_given() -> None:
+    """With q = s^2 the joint rests at s = 0 whatever sd is, and sd^2 is half of its acceleration there."""
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[1.0]], [[0.0]], [[0.0]]]))
+    fastest = time_optimal(path, symmetric(9.0), symmetric(1.0))
+    assert float(fastest.law.evaluate(0.0, 1)[0]) == pytest.approx(np.sqrt(0.5), rel=1e-3)
+    given = time_optimal(path, symmetric(9.0), symmetric(1.0), start_velocity=0.3)
+    assert float(given.law.evaluate(0.0, 1)[0]) == pytest.approx(0.3, rel=1e-6)
+
+
+def curved(seed: int = 6) -> tuple[PiecewisePolynomial, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return spline(rng.uniform(-1, 1, (6, 3)), np.arange(6.0)), *random_bounds(rng, 3)
+
+
+@pytest.mark.parametrize(("velocity", "acceleration"), [(1.0, 1.0), (0.3, 100.0), (100.0, 1.0)])
+def test_a_motion_that_is_stretched_is_the_path_under_its_law_and_meets_a_limit(
+    velocity: float, acceleration: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("_ROUNDS", "_MOST_TIGHTENINGS"):
+        monkeypatch.setattr(parameterization, name, 0)
+    path, *bounds = curved()
+    bounds = [bounds[0] * velocity, bounds[1] * acceleration]
+    found = time_optimal(path, *bounds)
+    assert found.stretch > 1 + 1e-7
+    assert found.law.end == pytest.approx(found.trajectory.end, rel=1e-12)
+    times = np.linspace(0.0, found.law.end, 501)
+    s = found.law.evaluate(times)[:, 0].clip(path.start, path.end)
+    np.testing.assert_allclose(found.trajectory.evaluate(times), path.evaluate(s), atol=1e-9)
+    assert 0.99 <= max(over(found.trajectory, *bounds)) <= 1 + 1e-9
+    assert found.tightened == 0
+
+
+@pytest.mark.parametrize("speeds", [(0.3, 0.0), (0.0, 0.3), (0.3, 0.2)])
+def test_a_motion_with_a_speed_at_either_end_is_not_stretched(
+    speeds: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, *bounds = curved()
+    ends = {"start_velocity": speeds[0], "end_velocity": speeds[1]}
+    found = time_optimal(path, *bounds, **ends)
+    assert found.stretch == 1.0
+    assert max(over(found.trajectory, *bounds)) <= 1 + 1e-9
+    monkeypatch.setattr(parameterization, "_MOST_TIGHTENINGS", 0)
+    with pytest.raises(UnsettledSpeedError) as caught:
+        time_optimal(path, *bounds, **ends)
+    assert caught.value.over > 1.0
+
+
+def test_every_further_constraint_counts() -> None:
+    path, wide = polyline([[0.0], [1.0]]), symmetric(50.0)
+    loose, tight = (JointConstraint(path, symmetric(v), symmetric(a)) for v, a in ((5.0, 9.0), (0.5, 1.0)))
+    for further in ([loose, tight], [tight, loose]):
+        found = time_optimal(path, wide, wide, further=further, along=(0.5, 1.0))
+        assert found.trajectory.duration == pytest.approx(2.5, rel=1e-4)
+        assert found.lower_bound == pytest.approx(2.5, rel=1e-3)
+    none = np.array([[-np.inf, np.inf]])
+    alone = time_optimal(path, none, none, further=[tight])
+    assert alone.trajectory.duration == pytest.approx(2.5, rel=1e-4)
+    assert time_optimal(path, none, none, further=[tight], along=(0.5, 1.0)).lower_bound > 2.49
