@@ -8,7 +8,8 @@ from jerk_paths import both, polyline, spline
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
 from trajcli.curves.extrema import peaks
-from trajcli.curves.third_order.jerk import JointJerkConstraint
+from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.curves.third_order.jerk import JointJerkConstraint, LawJerkConstraint
 from trajcli.curves.third_order.parameterization import _stretch, jerk_limited_time_optimal
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.time_law import LawPieces, law_and_trajectory
@@ -100,3 +101,24 @@ def test_speeds_of_both_ends_are_kept_and_count_in_the_bound(ends: tuple[float, 
     assert Ruckig(1).calculate(wanted, answer) == Result.Working
     assert 0.8 * answer.duration <= found.lower_bound <= answer.duration * (1 + 1e-9)
     assert found.trajectory.duration == pytest.approx(answer.duration, rel=2e-2)
+
+
+class OfTool(LawJerkConstraint):
+    """A limit of the jerk of the law that stands for one of a tool, whose path bends with the joints'."""
+
+    curved = True
+
+
+def test_a_tool_with_a_limit_of_jerk_stops_where_the_curvature_jumps() -> None:
+    """A joint that goes evenly and then faster; it has no limit of jerk itself."""
+    path = PiecewisePolynomial(
+        np.array([0.0, 0.5, 1.0]), np.array([[[0.0], [0.8]], [[1.0], [1.0]], [[0.0], [0.5]]])
+    )
+    free = np.array([[-np.inf, np.inf]])
+    bounds = both([1.0]), both([2.0]), free
+    law, tool = LawJerkConstraint(20.0), OfTool(20.0)
+    for further, stops in (([law], []), ([tool], [0.5]), ([law, tool], [0.5]), ([tool, law], [0.5])):
+        found = jerk_limited_time_optimal(path, *bounds, further_jerk=further)
+        assert found.stops.tolist() == stops
+        rates = found.law.evaluate(found.stop_times, 1)
+        np.testing.assert_allclose(rates, 0.0, atol=1e-6)

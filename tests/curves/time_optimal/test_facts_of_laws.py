@@ -10,6 +10,7 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal import parameterization
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal.passes import UnlimitedSpeedError
 
 FROM_REST = 2 * np.sqrt([0.3, 0.3, 0.4])  # over these distances, at 1 m/s^2
 
@@ -80,6 +81,7 @@ def test_a_motion_with_a_speed_at_either_end_is_not_stretched(
     path, *bounds = curved()
     ends = {"start_velocity": speeds[0], "end_velocity": speeds[1]}
     found = time_optimal(path, *bounds, **ends)
+    assert found.refinements > 0
     assert found.stretch == 1.0
     assert max(over(found.trajectory, *bounds)) <= 1 + 1e-9
     monkeypatch.setattr(parameterization, "_MOST_TIGHTENINGS", 0)
@@ -99,3 +101,28 @@ def test_every_further_constraint_counts() -> None:
     alone = time_optimal(path, none, none, further=[tight])
     assert alone.trajectory.duration == pytest.approx(2.5, rel=1e-4)
     assert time_optimal(path, none, none, further=[tight], along=(0.5, 1.0)).lower_bound > 2.49
+
+
+def test_limits_of_further_constraints_count_in_the_bound() -> None:
+    path, wide = polyline([[0.0], [1.0]]), symmetric(50.0)
+    tight = JointConstraint(path, symmetric(0.5), symmetric(1.0))
+    found = time_optimal(path, wide, wide, further=[tight])
+    assert found.trajectory.duration == pytest.approx(2.5, rel=1e-4)
+    assert 4 * 2 / np.sqrt(50) <= found.lower_bound <= 2.5 * (1 + 1e-9)
+
+
+def test_a_path_of_no_length_has_no_fastest_law() -> None:
+    with pytest.raises(UnlimitedSpeedError):
+        time_optimal(PiecewisePolynomial(np.zeros(2), np.zeros((2, 1, 1))), symmetric(1.0), symmetric(1.0))
+
+
+def test_a_path_that_stands_still_at_its_ends_may_be_stretched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two joints by 3 s^2 - 2 s^3 and by 10 s^3 - 15 s^4 + 6 s^5: any sd is rest at both ends."""
+    for name in ("_ROUNDS", "_MOST_TIGHTENINGS"):
+        monkeypatch.setattr(parameterization, name, 0)
+    rows = [[0.0, 0.0, -2.0, 3.0, 0.0, 0.0], [6.0, -15.0, 10.0, 0.0, 0.0, 0.0]]
+    path = PiecewisePolynomial(np.array([0.0, 1.0]), np.array(rows).T[:, None, :])
+    bounds = symmetric(1.0, 1.0), symmetric(2.0, 2.0)
+    found = time_optimal(path, *bounds)
+    assert found.stretch > 1.0
+    assert max(over(found.trajectory, *bounds)) <= 1 + 1e-9

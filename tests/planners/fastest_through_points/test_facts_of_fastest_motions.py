@@ -16,6 +16,7 @@ from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.planners.fastest_through_points.assembly import (
     FastestMotion,
     _exact,
+    _keeps_positions,
     fastest_motion,
     straight_only,
 )
@@ -132,13 +133,13 @@ def test_collinear_points_are_passed_on_the_straight_line_or_faster() -> None:
     assert found.motion.duration == pytest.approx(whole, rel=1e-6)
 
 
-@pytest.mark.parametrize("what", ["start", "between", "least"])
+@pytest.mark.parametrize("what", ["start", "between", "stop", "least"])
 def test_a_straight_line_is_left_where_more_is_asked_for(what: str) -> None:
     made = problem([[0, 0], [0.2, 0.3], [0.4, 0.6]], joints=2)
     if what == "start":
         made = given(made, 0, 0, 0.3, joint=1)
-    elif what == "between":
-        made = given(made, 1, 0, 0.1)
+    elif what in ("between", "stop"):
+        made = given(made, 1, 0, 0.1 if what == "between" else 0.0)
     else:
         made = replace(made, least=np.array([0.0, 1.5]))
     found = fastest_motion(made, NAMES[: made.joints], 2)
@@ -146,8 +147,8 @@ def test_a_straight_line_is_left_where_more_is_asked_for(what: str) -> None:
     velocity = found.motion.curve.evaluate(found.motion.times, 1)
     if what == "start":
         np.testing.assert_allclose(velocity[0], [0.0, 0.3], atol=1e-9)
-    elif what == "between":
-        assert float(velocity[1, 0]) == pytest.approx(0.1, abs=1e-8)
+    elif what in ("between", "stop"):
+        assert float(velocity[1, 0]) == pytest.approx(0.1 if what == "between" else 0.0, abs=1e-8)
     else:
         assert np.diff(found.motion.times)[1] >= 1.5 * (1 - 1e-9)
 
@@ -202,6 +203,54 @@ def test_what_is_given_beyond_a_limit_is_no_matter_of_position_limits() -> None:
     walls: Any = np.array([[-5.0, 5.0]] * 2)
     with pytest.raises(PlanningError, match="with the velocities and accelerations that are given"):
         fastest_motion(replace(made, position=walls), NAMES, 2)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_motion_keeps_positions_up_to_rounding_on_each_side(joint: int, sign: float) -> None:
+    free = problem(sign * POINTS, joints=2)
+    motion = fastest_motion(free, NAMES, 1).motion
+    times = np.linspace(0.0, motion.duration, 200001)
+    reached = motion.curve.evaluate(times)[:, joint]
+    for side, edge, out in ((0, reached.min(), -1.0), (1, reached.max(), 1.0)):
+        for by, kept in ((1e-3, True), (5e-10, True), (-5e-10, True), (-1e-6, False), (-1e-3, False)):
+            walls = np.array([[-np.inf, np.inf]] * 2)
+            walls[joint, side] = edge + out * by
+            assert _keeps_positions(replace(free, position=walls), motion) is kept
+
+
+def test_states_of_a_motion_that_leaves_position_limits_are_lowered_until_it_does_not() -> None:
+    points = np.array([[0, 0], [1, 0.3], [0.2, 0.9], [0.6, 0.1]])
+    free = problem(points, joints=2)
+    best = search(free, 2).best
+    passing = _exact(free, best, NAMES)
+    assert passing is not None
+    (beyond,) = peaks(passing.curve, (0,))
+    ends = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
+    walls = ends + 0.9 * (np.stack([beyond.low, beyond.high], axis=1) - ends)
+    made = replace(free, position=walls)
+    exact = _exact(made, best, NAMES)
+    assert exact is not None
+    (peak,) = peaks(exact.curve, (0,))
+    assert (peak.high <= walls[:, 1] + 1e-9).all()
+    assert (peak.low >= walls[:, 0] - 1e-9).all()
+    stops = sum(times_of(made, np.zeros_like(made.states)))
+    assert best.duration < exact.duration <= stops * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_with_time_to_spare_a_straight_motion_takes_no_run_up_beyond_its_ends(sign: float) -> None:
+    made = problem(sign * np.array([[0, 0], [0.2, 0.3], [0.9, 1.35]]), joints=2)
+    made = replace(made, least=np.array([3.0, 0.0]))
+    found = straight_only(made, NAMES, 4)
+    keeps(made, found)
+    (peak,) = peaks(found.motion.curve, (0,))
+    ends = np.sort(made.points[[0, -1]], axis=0)
+    assert (peak.low >= ends[0] - 1e-9).all()
+    assert (peak.high <= ends[1] + 1e-9).all()
+    free = straight_only(replace(made, least=np.zeros(2)), NAMES, 4)
+    assert found.motion.times[1] >= 3.0 * (1 - 1e-9)
+    assert found.motion.duration < 3.0 + free.motion.duration
 
 
 def test_states_that_ruckig_cannot_join_are_lowered_a_little() -> None:

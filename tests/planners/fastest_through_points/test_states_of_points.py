@@ -67,21 +67,18 @@ def test_only_a_segment_that_leaves_position_limits_lasts_for_ever() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_joints_that_leave_position_limits_are_slowed_at_both_ends_of_the_segment(sign: float) -> None:
-    points = sign * np.array([0.0, 1.0, 0.6, 1.3, 2.0])
-    given = problem(points)
-    states = with_states(given, sign * np.array([0.7, 0.0, 0.9, 0.9])[:3].reshape(3, 1, 1) * [1.0, 0.5])
-    narrow = replace(given, position=np.array([[-2.1, 2.1]]))
-    untouched = within_position_limits(narrow, states)
-    np.testing.assert_array_equal(untouched.states, evaluated(narrow, states).states)
-    ends = (-0.1, 1.02, 3.0) if sign > 0 else (-3.0, -1.02, 0.1)
-    three = problem(points[[0, 1, 2]], walls=sorted([ends[0], ends[2]]))
-    three = replace(three, position=np.array([sorted([-0.1 * sign, 1.02 * sign])]))
-    fast = with_states(three, [sign * 0.8, 0.0])
-    assert not np.isfinite(evaluated(three, fast).duration)
-    slowed = within_position_limits(three, fast)
-    assert np.isfinite(slowed.duration)
-    assert walled(three, slowed)
-    assert 0 < sign * slowed.states[1, 0, 0] < 0.8
+    points = sign * np.array([0.0, 1.0, 0.6])
+    wide = problem(points, walls=[-2.1, 2.1])
+    states = with_states(wide, [sign * 0.7, 0.3])
+    np.testing.assert_array_equal(within_position_limits(wide, states).states, evaluated(wide, states).states)
+    three = problem(points, walls=sorted([-0.1 * sign, 1.02 * sign]))
+    for speed in (0.8, -0.8):  # behind the middle point it goes beyond, or before it
+        fast = with_states(three, [sign * speed, 0.0])
+        assert not np.isfinite(evaluated(three, fast).duration)
+        slowed = within_position_limits(three, fast)
+        assert np.isfinite(slowed.duration)
+        assert walled(three, slowed)
+        assert 0 < slowed.states[1, 0, 0] / (sign * speed) < 1
 
 
 def out_and_back(distance: float) -> float:
@@ -228,3 +225,60 @@ def test_central_differences_are_those_of_parabolas_at_the_speed_that_is_fastest
     assert speeds[0] == pytest.approx(min(durations, key=durations.__getitem__), rel=1e-9)
     pairs = list(pairwise(t))
     assert len(pairs) == given.segments
+
+
+def mirrored(given: WaypointProblem) -> WaypointProblem:
+    """Return the same problem in the other direction of each joint."""
+    limits = (-each[:, ::-1] for each in (given.velocity, given.acceleration, given.position))
+    velocity, acceleration, position = limits
+    return replace(
+        given,
+        points=-given.points,
+        states=-given.states,
+        velocity=velocity,
+        acceleration=acceleration,
+        position=position,
+    )
+
+
+@pytest.mark.parametrize("seed", few(range(8), 3))
+def test_walls_above_count_as_walls_below_of_the_mirrored_problem(seed: int) -> None:
+    points = np.random.default_rng(seed).uniform(-1, 1, (6, 2))
+    given = problem(points, joints=2)
+    walls = np.stack([np.full(2, -np.inf), points.max(axis=0) + 0.01], axis=1)
+    given = replace(given, position=walls).scaled()
+    durations = []
+    for each in (given, mirrored(given)):
+        found = improved(each, evaluated(each, each.stopping()))
+        assert walled(each, found)
+        durations.append(found.duration)
+    assert durations[0] == pytest.approx(durations[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", few(range(8), 3))
+@pytest.mark.parametrize("size", [0.5, 4.0])
+def test_the_mirrored_problem_lasts_as_long(seed: int, size: float) -> None:
+    given = problem(np.random.default_rng(seed).uniform(-size, size, (6, 2)), joints=2).scaled()
+    found, other = (improved(each, evaluated(each, each.stopping())) for each in (given, mirrored(given)))
+    assert found.duration == pytest.approx(other.duration, rel=1e-3)
+
+
+def test_a_joint_that_leaves_its_limits_is_slowed_alone_and_in_vain_where_all_is_given() -> None:
+    given = problem([[0, 0], [1, 0.4], [0.6, 1.2], [0.1, 1.6]], joints=2)
+    given = replace(given, position=np.array([[-0.1, 1.02], [-5.0, 5.0]]))
+    states = with_states(given, [[0.8, 0.2], [0.9, 0.3]])
+    states[2, 0] = [-0.4, 0.3]
+    slowed = within_position_limits(given, states)
+    assert np.isfinite(slowed.duration)
+    inside = given.inside(states)
+    np.testing.assert_array_equal(slowed.states[:, 1], inside[:, 1])
+    assert 0 < slowed.states[1, 0, 0] < 0.8
+    fixed, stated = given.fixed.copy(), given.states.copy()
+    fixed[1, 0, 0], stated[1, 0, 0] = True, 0.8
+    hopeless = replace(given, fixed=fixed, states=stated)
+    found = within_position_limits(hopeless, states)
+    assert np.isinf(found.duration)
+    assert improved(hopeless, found) is found
+    single = problem([0.0, 1.0])
+    motion = evaluated(single, single.stopping())
+    assert improved(single, motion) is motion
