@@ -126,3 +126,17 @@ def test_a_path_that_stands_still_at_its_ends_may_be_stretched(monkeypatch: pyte
     found = time_optimal(path, *bounds)
     assert found.stretch > 1.0
     assert max(over(found.trajectory, *bounds)) <= 1 + 1e-9
+
+
+def test_a_limit_that_cannot_be_settled_is_named_where_it_is_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is one of a second arm, which bends about s = 0.75 alone."""
+    monkeypatch.setattr(parameterization, "_MOST_TIGHTENINGS", 0)
+    bend = spline(
+        [[0.0], [0.0], [0.03], [0.0], [0.0]], np.array([0.0, 0.7, 0.75, 0.8, 1.0]), bc_type="clamped"
+    )
+    other = JointConstraint(bend, symmetric(1.0), symmetric(2.0))
+    with pytest.raises(UnsettledSpeedError) as caught:
+        time_optimal(
+            polyline([[0.0], [1.0]]), symmetric(9.0), symmetric(9.0), further=[other], start_velocity=0.05
+        )
+    assert 0.65 < caught.value.s < 0.85

@@ -10,6 +10,7 @@ import pytest
 from point_problems import JERK, by_ruckig, problem, times_of, with_states
 from tiers import few
 
+from trajcli.planners.fastest_through_points import search as fastest_search
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.search import (
     _STARTS,
@@ -282,3 +283,36 @@ def test_a_joint_that_leaves_its_limits_is_slowed_alone_and_in_vain_where_all_is
     single = problem([0.0, 1.0])
     motion = evaluated(single, single.stopping())
     assert improved(single, motion) is motion
+
+
+@pytest.mark.parametrize("first_is_poor", [False, True])
+def test_the_best_of_all_starts_is_taken(first_is_poor: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of these starts the first and the third lead to the fastest motion, that of stopping to a slower one."""
+    given = problem(np.random.default_rng(7).uniform(-1, 1, (6, 2)), 4.0, joints=2)
+    if first_is_poor:
+        monkeypatch.setattr(fastest_search, "_STARTS", (_STARTS[1], *_STARTS[1:]))
+    found = search(given, 4)
+    assert found.durations[-1] > min(found.durations) * 1.001
+    assert (found.durations[0] > min(found.durations) * 1.001) is first_is_poor
+    assert found.best.duration == pytest.approx(min(found.durations), rel=2e-6)
+
+
+def test_a_motion_to_begin_with_is_one_of_those_that_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search from it leads to the states of stopping, which no step makes as fast as the straight motion."""
+    given = problem([0.0, 0.4, 1.0, 1.3], 4.0)
+    whole = by_ruckig(problem([0.0, 1.3], 4.0), 0, 0, np.zeros((2, 1, 2)))
+    rows = np.array([np.ravel(whole.at_time(t)) for t in np.linspace(0.0, whole.duration, 20001)])
+    states = with_states(given, rows[np.searchsorted(rows[:, 0], [0.4, 1.0])][:, None, 1:])
+    monkeypatch.setattr(fastest_search, "states_by_free_knots", lambda problem, *_: problem.stopping())
+    assert search(given, 1).best.duration > 1.015 * whole.duration
+    assert search(given, 1, given=states).best.duration < 1.01 * whole.duration
+
+
+def test_states_that_are_found_are_rounded() -> None:
+    given = problem(POINTS[[0, 1, 2]], 4.0, joints=2)
+    small = given.reachable().scaled()
+    time, lengths = given.units
+    found = search(given, 1).best.states * np.stack([time / lengths, time**2 / lengths], axis=1)
+    steps = found[1] / (2.0**-21 * small.scales)
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+    assert np.abs(steps).max() > 1e3
