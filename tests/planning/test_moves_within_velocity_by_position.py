@@ -246,6 +246,22 @@ def test_units_of_the_job_count() -> None:
     ("joint", "limits", "message"),
     [
         ({"velocity_by_position": {"deceleration": 2}}, None, "of j1 needs its position limits"),
+        *(
+            (
+                {"position": ends, "velocity_by_position": {"deceleration": 2}},
+                None,
+                "of j1 needs its position",
+            )
+            for ends in ([None, 1], [-1, None])
+        ),
+        *(
+            (
+                {"position": 1, "velocity_by_position": {"deceleration": 2}},
+                {"position": [ends]},
+                "j1 has velo",
+            )
+            for ends in ([None, 1], [-1, None])
+        ),
         ({"position": 1, "velocity_by_position": {"deceleration": 0}}, None, "expected a number above 0"),
         ({"position": 1, "velocity_by_position": {"deceleration": 1, "offset": -1}}, None, "at least 0"),
         ({"position": 1, "velocity_by_position": {"offset": 1}}, None, "deceleration"),

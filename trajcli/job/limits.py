@@ -19,7 +19,6 @@ from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, ToolLimits
 from trajcli.language.efforts import OF_ROBOT, EffortBounds
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import FieldPath
-from trajcli.language.per_joint import UNLIMITED
 from trajcli.limits.kinds import JOINT_KINDS, KIND_OF, TOOL_KINDS
 from trajcli.planners.planner import Event
 from trajcli.units import effort_unit
@@ -55,7 +54,7 @@ def with_job_limits(
     """
     if spec is None:
         return robot, []
-    unlimited = [index for index, bound in enumerate(spec.position) if bound == UNLIMITED]
+    unlimited = [k for k, bound in enumerate(spec.position) if bound and not np.isfinite(bound).all()]
     for joint in unlimited:
         if np.isfinite(robot.limits.velocity_by_position[joint, 0]):
             name = robot.joint_names[joint]

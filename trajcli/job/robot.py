@@ -172,7 +172,7 @@ class RobotModel(Model):
                 raise refuse([(where, f"joint names must be unique, '{name}' stands twice", None)])
             names.append(name)
         for index, joint in enumerate(joints):
-            if joint.velocity_by_position is not None and joint.position == UNLIMITED:
+            if joint.velocity_by_position is not None and not np.isfinite(joint.position).all():
                 text = f"velocity_by_position of {names[index]} needs its position limits"
                 hint = "give the joint `position: [lower, upper]`"
                 raise refuse([(("joints", index, "velocity_by_position"), text, hint)])
