@@ -1,0 +1,111 @@
+"""`trajcli batch`: its options do what they do to `trajcli plan`, and its lines say what came of each job."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running import FAST, IMPOSSIBLE, JOB, SLOWED, call
+
+Capture = pytest.CaptureFixture[str]
+TIMED = JOB.replace("duration: 1}", "duration: 1.03}").replace(
+    "velocity: 90", "velocity: 90, acceleration: 400"
+)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write(**texts: str) -> None:
+    for name, text in texts.items():
+        Path(f"{name}.yaml").write_text(text, encoding="utf-8")
+
+
+def outcomes(out: str) -> dict[str, dict[str, Any]]:
+    return {Path(one["job"]).stem: one for one in map(json.loads, out.splitlines())}
+
+
+@pytest.mark.parametrize("words", [("--rows", "knots"), ("--for", "ros-jtc")])
+def test_rows_are_those_of_plan(words: tuple[str, ...], capfd: Capture) -> None:
+    write(a=TIMED)
+    assert call(capfd, "plan", "a.yaml", "-o", "plan.csv", *words).code == 0
+    assert call(capfd, "plan", "a.yaml", "-o", "plain.csv").code == 0
+    assert call(capfd, "batch", "a.yaml", *words).code == 0
+    assert Path("a.csv").read_bytes() == Path("plan.csv").read_bytes() != Path("plain.csv").read_bytes()
+
+
+def test_what_is_unchanged_is_planned_where_that_is_asked_for(capfd: Capture) -> None:
+    write(a=JOB)
+    found = [outcomes(call(capfd, "batch", "a.yaml", *words).out)["a"] for words in ((), (), ("--force",))]
+    assert [one["outcome"] for one in found] == ["written", "unchanged", "written"]
+    assert [(one["duration"], one["output"]) for one in found] == [(1.0, "a.csv")] * 3
+    assert len({one["hash"] for one in found}) == 1
+
+
+def test_as_many_processes_as_are_allowed(capfd: Capture) -> None:
+    write(a=JOB)
+    assert call(capfd, "batch", "a.yaml", "-j", "1024").code == 0
+    assert call(capfd, "batch", "a.yaml", "-j", "1025").code == 2
+
+
+def test_a_job_that_fails_has_a_line_of_its_own_and_the_worst_code_counts(capfd: Capture) -> None:
+    """Two moves over their limit, one that is impossible, and one that is done, in whatever order they come."""
+    move = "  - {planner: quintic, to: {joints: 0}, duration: 0.25}\n"
+    write(good=JOB, fast=FAST.replace("output:", move + "output:"), never=IMPOSSIBLE)
+    code, out, err = call(capfd, "batch", "good.yaml", "fast.yaml", "never.yaml", "-o", "out", "-j", "1")
+    found = outcomes(out)
+    assert (code, {name: one["exit"] for name, one in found.items()}) == (
+        3,
+        {"good": 0, "fast": 1, "never": 3},
+    )
+    assert {name: one["output"] for name, one in found.items()} == {
+        "good": "out/good.csv",
+        "fast": None,
+        "never": None,
+    }
+    assert [problem["move"] for problem in found["fast"]["problems"]] == [0, 1]
+    assert found["fast"]["error"].endswith("(and 1 more)")
+    assert "more)" not in found["never"]["error"]
+    said = err.splitlines()
+    assert [line for line in said if line.startswith("fast.yaml: failed: ")]
+    assert [line for line in said if line.startswith("never.yaml: failed: ")]
+    assert said[-1].startswith("3 jobs: 2 failed, 1 written, ")
+    assert "stale" not in err
+
+
+def test_errors_of_a_batch_for_machines_are_of_their_classes(capfd: Capture) -> None:
+    write(fast=FAST, never=IMPOSSIBLE, wrong=JOB.replace("rate", "rte"))
+    words = ("batch", "fast.yaml", "never.yaml", "wrong.yaml", "-o", "out", "-j", "1", "--errors", "json")
+    code, _, err = call(capfd, *words)
+    kinds = {
+        each["exit"]: each["error"]
+        for each in map(json.loads, filter(lambda t: t[0] == "{", err.splitlines()))
+    }
+    assert (code, kinds) == (3, {1: "VerificationError", 2: "InputError", 3: "PlanningError"})
+
+
+def test_a_job_with_an_event_fails_where_that_is_asked_for(capfd: Capture) -> None:
+    write(slowed=SLOWED)
+    assert call(capfd, "batch", "slowed.yaml", "-o", "a").code == 0
+    assert call(capfd, "batch", "slowed.yaml", "-o", "b", "--strict").code == 1
+
+
+def test_quiet_says_nothing_of_what_was_written(capfd: Capture) -> None:
+    write(a=JOB)
+    assert call(capfd, "batch", "a.yaml", "-q").err == ""
+    assert call(capfd, "batch", "a.yaml").err.startswith("1 job: 1 unchanged, ")
+
+
+def test_folders_without_jobs_are_named(capfd: Capture) -> None:
+    Path("jobs").mkdir()
+    write(**{f"jobs/n{k}": "a: 1\n" for k in range(7)}, **{"jobs/a": JOB})
+    err = call(capfd, "batch", "jobs", "-o", "out").err
+    assert (
+        "no jobs, left out: jobs/n0.yaml, jobs/n1.yaml, jobs/n2.yaml, jobs/n3.yaml, jobs/n4.yaml and 2 more\n"
+        in err
+    )
