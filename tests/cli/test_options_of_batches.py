@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ Capture = pytest.CaptureFixture[str]
 TIMED = JOB.replace("duration: 1}", "duration: 1.03}").replace(
     "velocity: 90", "velocity: 90, acceleration: 400"
 )
+
+MOVE = "  - {planner: quintic, to: {joints: 0}, duration: 0.25}\n"
 
 
 @pytest.fixture(autouse=True)
@@ -55,8 +58,7 @@ def test_as_many_processes_as_are_allowed(capfd: Capture) -> None:
 
 def test_a_job_that_fails_has_a_line_of_its_own_and_the_worst_code_counts(capfd: Capture) -> None:
     """Two moves over their limit, one that is impossible, and one that is done, in whatever order they come."""
-    move = "  - {planner: quintic, to: {joints: 0}, duration: 0.25}\n"
-    write(good=JOB, fast=FAST.replace("output:", move + "output:"), never=IMPOSSIBLE)
+    write(good=JOB, fast=FAST.replace("output:", MOVE + "output:"), never=IMPOSSIBLE)
     code, out, err = call(capfd, "batch", "good.yaml", "fast.yaml", "never.yaml", "-o", "out", "-j", "1")
     found = outcomes(out)
     assert (code, {name: one["exit"] for name, one in found.items()}) == (
@@ -79,13 +81,18 @@ def test_a_job_that_fails_has_a_line_of_its_own_and_the_worst_code_counts(capfd:
 
 
 def test_errors_of_a_batch_for_machines_are_of_their_classes(capfd: Capture) -> None:
-    write(fast=FAST, never=IMPOSSIBLE, wrong=JOB.replace("rate", "rte"))
+    twice = FAST.replace("output:", MOVE + "output:")
+    write(fast=twice, never=IMPOSSIBLE, wrong=JOB.replace("rate", "rte"))
     words = ("batch", "fast.yaml", "never.yaml", "wrong.yaml", "-o", "out", "-j", "1", "--errors", "json")
     code, _, err = call(capfd, *words)
     kinds = {
         each["exit"]: each["error"]
         for each in map(json.loads, filter(lambda t: t[0] == "{", err.splitlines()))
     }
+    (both,) = [
+        each for each in map(json.loads, filter(lambda t: t[0] == "{", err.splitlines())) if each["exit"] == 1
+    ]
+    assert [problem["move"] for problem in both["problems"]] == [0, 1]
     assert (code, kinds) == (3, {1: "VerificationError", 2: "InputError", 3: "PlanningError"})
 
 
@@ -109,3 +116,17 @@ def test_folders_without_jobs_are_named(capfd: Capture) -> None:
         "no jobs, left out: jobs/n0.yaml, jobs/n1.yaml, jobs/n2.yaml, jobs/n3.yaml, jobs/n4.yaml and 2 more\n"
         in err
     )
+
+
+def test_people_read_words_and_the_reasons_behind_all_of_them(
+    capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(good=JOB, fast=FAST)
+    monkeypatch.setattr("trajcli.cli.batch.is_terminal", lambda stream: stream is sys.stdout)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    code, out, err = call(capfd, "batch", "good.yaml", "fast.yaml", "-o", "out", "-j", "1")
+    assert (code, len(out.splitlines())) == (1, 2)
+    words = {" ".join(line.split()) for line in out.splitlines()}
+    assert words == {"\x1b[1;32mwritten \x1b[0m good.yaml 1 s", "\x1b[1;31mfailed \x1b[0m fast.yaml"}
+    assert err.startswith("fast.yaml: failed: move 0 (quintic): the velocity of j1 reaches 225 deg/s")
