@@ -10,6 +10,9 @@ from typing import Any
 import pytest
 from running import FAST, IMPOSSIBLE, JOB, SLOWED, call
 
+from trajcli.cli.batch import timeout_of
+from trajcli.cli.motion_commands import BatchCommand
+
 Capture = pytest.CaptureFixture[str]
 TIMED = JOB.replace("duration: 1}", "duration: 1.03}").replace(
     "velocity: 90", "velocity: 90, acceleration: 400"
@@ -48,12 +51,20 @@ def test_what_is_unchanged_is_planned_where_that_is_asked_for(capfd: Capture) ->
     assert [one["outcome"] for one in found] == ["written", "unchanged", "written"]
     assert [(one["duration"], one["output"]) for one in found] == [(1.0, "a.csv")] * 3
     assert len({one["hash"] for one in found}) == 1
+    assert len(found[0]["hash"]) == 64
 
 
 def test_as_many_processes_as_are_allowed(capfd: Capture) -> None:
     write(a=JOB)
     assert call(capfd, "batch", "a.yaml", "-j", "1024").code == 0
     assert call(capfd, "batch", "a.yaml", "-j", "1025").code == 2
+
+
+def test_no_time_is_all_the_time(capfd: Capture) -> None:
+    write(a=JOB)
+    assert call(capfd, "batch", "a.yaml", "--timeout", "0", "-j", "1").code == 0
+    times = [timeout_of(BatchCommand(timeout=text)) for text in (None, "0", "2.5")]
+    assert times == [600.0, None, 2.5]
 
 
 def test_a_job_that_fails_has_a_line_of_its_own_and_the_worst_code_counts(capfd: Capture) -> None:
