@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from running import call
 
 from trajcli.cli.arm_commands import joined, sorted_words
 
@@ -16,6 +17,7 @@ JOINED = [
     ("--near --json", "--near --json"),
     ("--near 10deg -5mm --json", "--near=10deg,-5mm --json"),
     ("-- --qd 1", "-- --qd 1"),
+    ("0 --qdd 1 -2 --json", "0 --qdd=1,-2 --json"),
     ("--near nan -inf 3 -", "--near=nan,-inf,3 -"),
     ("{a} --point -2 1 1 {b}", "{a} --point=-2,1,1 {b}"),
     ("{a} --s 0 0.5 1 --json", "{a} --s=0,0.5,1 --json"),
@@ -34,6 +36,7 @@ SORTED = [
     ("- --robot=ur5e", "--robot=ur5e -- -"),
     ("--jsn 1", "--jsn -- 1"),
     ("3 --robot", "--robot"),
+    ("--json 3 --robot", "--json --robot"),
     ("3 --robot -- 4", "--robot"),
     ("0 -inf --json", "--json -- 0 -inf"),
 ]
@@ -42,3 +45,15 @@ SORTED = [
 @pytest.mark.parametrize(("given", "expected"), SORTED)
 def test_negative_numbers_are_no_options(given: str, expected: str) -> None:
     assert sorted_words(given.split(), TAKES) == expected.split()
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "arm.yaml", "arm.yml", "arm.urdf"])
+def test_a_robot_where_numbers_stand_is_told_its_option(
+    robot: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    refused = call(capfd, "fk", robot, "0", "-90")
+    assert (refused.code, refused.out) == (2, "")
+    assert f"The robot is an option: trajcli fk --robot {robot} ..." in refused.err
+    for words in (("fk", "-r", "ur5e", robot), ("fk", "--robot=ur5e", robot), ("pose", robot)):
+        other = call(capfd, *words)
+        assert (other.code, "The robot is an option" in other.err) == (2, False), words
