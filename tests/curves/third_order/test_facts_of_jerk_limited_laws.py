@@ -122,3 +122,41 @@ def test_a_tool_with_a_limit_of_jerk_stops_where_the_curvature_jumps() -> None:
         assert found.stops.tolist() == stops
         rates = found.law.evaluate(found.stop_times, 1)
         np.testing.assert_allclose(rates, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("ends", [(0.0, 0.5), (0.5, 0.0), (0.2, 0.6)])
+def test_where_jerk_hardly_counts_the_speeds_of_both_ends_say_what_the_bound_is(
+    ends: tuple[float, float],
+) -> None:
+    """Ramps from and to 0.8 m/s at 2 m/s^2, and the rest at that speed."""
+    path, bounds = polyline(np.array([[0.0], [1.0]])), [both([limit]) for limit in (0.8, 2.0, 1e5)]
+    found = jerk_limited_time_optimal(path, *bounds, start=(ends[0], 0.0), end=(ends[1], 0.0))
+    ramps = [((0.8 - speed) / 2.0, (0.8**2 - speed**2) / 4.0) for speed in ends]
+    shortest = sum(time for time, _ in ramps) + (1.0 - sum(way for _, way in ramps)) / 0.8
+    assert shortest * 0.98 <= found.lower_bound <= shortest * (1 + 1e-4)
+    assert shortest * (1 - 1e-9) <= found.trajectory.duration <= shortest * 1.01
+
+
+@pytest.mark.parametrize("corner", [False, True])
+def test_limits_along_the_path_that_others_imply_are_in_the_bound(corner: bool) -> None:
+    """At 0.5 m/s and 1 m/s^2 along it one metre takes 2.5 s, and half a metre 1.5 s."""
+    points = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 0.5]]) if corner else np.array([[0.0, 0.0], [1.0, 0.0]])
+    path, wide = polyline(points), [both([limit] * 2) for limit in (50.0, 50.0, 1e5)]
+    even = PiecewisePolynomial(path.breaks, np.stack([np.ones((path.pieces, 1)), path.breaks[:-1, None]]))
+    further = [JointConstraint(even, both([0.5]), both([1.0]))]
+    found = jerk_limited_time_optimal(path, *wide, further=further, along=(0.5, 1.0))
+    assert found.lower_bound == pytest.approx(2 * 1.5 if corner else 2.5, rel=1e-2)
+    assert found.lower_bound <= found.trajectory.duration * (1 + 1e-9)
+    assert (found.bounding_joint, found.bounded_by_stops) == (None, False)
+
+
+def test_what_a_finer_grid_would_save_is_a_share_of_the_duration() -> None:
+    rng = np.random.default_rng(3)
+    path = spline(np.linspace(0, 1, 6), rng.uniform(-1, 1, (6, 2)))
+    shares = [
+        jerk_limited_time_optimal(
+            path, *(both([limit / slower**order] * 2) for order, limit in enumerate((1.0, 3.0, 30.0), 1))
+        ).lost
+        for slower in (1.0, 64.0)
+    ]
+    assert shares[1] == pytest.approx(shares[0], rel=0.5)

@@ -39,7 +39,9 @@ if TYPE_CHECKING:
 _BISECTIONS = 20
 _SAMPLES = 17  # of the rest of the path, at which it is asked whether the arm reaches it
 _NEXT = 4e-6  # of the whole: how far beyond the failure the first of them is
-_SLOW = 20.0  # rad for each length of the arm: a joint that goes less is not near a singularity
+_SLOW = (
+    20.0  # rad, or lengths of the arm, for each of these: a joint that goes less is not near a singularity
+)
 _REGULAR = 1e-3  # of the largest singular value: with more there is no singularity nearby
 _SLOPE = 1e-5  # of the whole: step of the difference that says how fast a joint would have to go
 _KEEPS_RATES = Tolerance()  # so near, a tool whose law is at a limit of its rates is not above it
@@ -206,7 +208,9 @@ class FollowingDiagnosis:
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
         per = "s" if self.law is not None else "rad of the path" if self.angular else "m of the path"
         symptom = f"{{joint}} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
-        if self.law is None and abs(float(rates[joint])) < _SLOW / characteristic_length(self.robot):
+        length = characteristic_length(self.robot)
+        racing = _SLOW * (1.0 if unit == "rad" else length) / (1.0 if self.angular else length)
+        if self.law is None and abs(float(rates[joint])) < racing:
             symptom = "branches of the arm meet, and it would pass from one to another"
         message = (
             f"the path runs into a singularity at s = {{place}}: there {symptom} (smallest over largest "
