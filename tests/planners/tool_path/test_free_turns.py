@@ -63,6 +63,19 @@ def test_one_limit_of_turning_is_enough_for_a_free_turn_to_count(limit):
     assert 0.5 * 0.4 < np.abs(rates.sum(axis=1)).max() <= 0.4 * (1 + 1e-6)
 
 
+def test_a_free_turn_uses_its_angular_acceleration_all_the_way():
+    """Along the line the arm turns one way: it speeds up over half of the turn, and slows down over the other."""
+    robot = {"name": "planar", "convention": "standard", "joints": [{"a": 0.5}, {"a": 0.5}]}
+    move = {"planner": "line", "to": {"xyz": [0.1, 0.6, 0]}, "law": {"shape": "time_optimal"}}
+    made = planned(
+        robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": {"angular_acceleration": 0.4}}
+    )
+    curve = made.trajectory.curve
+    turns = curve.evaluate(np.linspace(0, curve.end, 2001)).sum(axis=1)
+    assert (np.diff(turns) >= 0).all()
+    assert curve.duration == pytest.approx(2 * np.sqrt((turns[-1] - turns[0]) / 0.4), rel=1e-2)
+
+
 def test_joints_are_not_found_anew_for_a_turn_that_nothing_limits(monkeypatch):
     """Laws ask for rows at thousands of places; each would take steps of Newton."""
     asked = []
