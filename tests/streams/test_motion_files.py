@@ -136,6 +136,25 @@ def test_joints_named_in_another_order_have_their_own_types_and_units(tmp_path: 
     assert found.columns["q"] == ("slide_position", "turn_position")
 
 
+def test_times_of_a_rate_have_no_decimals_and_columns_those_that_are_written(tmp_path: Path) -> None:
+    rows = [[0.25, 100.125], [0.5, 100.0]]
+    found = open_motion(
+        ByteSource(written(tmp_path, "q1_deg,q2_mm", rows), 25.0), joint_types=("revolute", "prismatic")
+    )
+    assert found.whole().t.tolist() == [0.0, 0.04]
+    assert [column.decimals for column in found.written_columns()] == [None, 2, 3]
+    assert found.resolution.time == 0.0
+
+
+def test_zeros_of_a_joint_in_radians_are_written_as_the_other_joint(tmp_path: Path) -> None:
+    """And where one joint shows all the digits that there are, short numbers of others are exact, too."""
+    zeros = open_motion(written(tmp_path, "t,q1,q2,qd1,qd2", [[0, 0, 1.25, 0, 0.5], [1, 0, 1.5, 0, 0.125]]))
+    assert zeros.resolution.q.tolist() == pytest.approx([0.005, 0.005])
+    assert zeros.resolution.qd.tolist() == pytest.approx([0.0005, 0.0005])
+    full = open_motion(written(tmp_path, "t,q1,q2", [[0, 0.125, 0.1234567890123], [1, 0.5, 0.25]]))
+    assert full.resolution.q.tolist() == [0.0, 0.0]
+
+
 class TestByteSources:
     """Files and pipes, as often as they are asked for."""
 

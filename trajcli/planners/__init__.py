@@ -115,8 +115,8 @@ class _ByName:
     tags: tuple[str, ...]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:  # noqa: ANN401
-        known = _Planners({**_WHERE, **_BETWEEN})
-        choices = {tag: handler.generate_schema(known[tag]) for tag in self.tags}
+        every = _Planners({**_WHERE, **_BETWEEN})
+        choices = {tag: handler.generate_schema(every[tag]) for tag in self.tags}
         return core_schema.tagged_union_schema(choices, discriminator="planner")
 
 
@@ -141,8 +141,8 @@ def changed(planner: Planner, change: Mapping[str, Any]) -> Planner | None:
     """
     fields = dict(change)
     kind = PLANNERS[str(fields.pop("planner", planner.tag))]
-    known = set(kind.model_fields) & set(type(planner).model_fields) - {"planner"}
-    kept = {name: getattr(planner, name) for name in known}
+    shared = set(kind.model_fields) & set(type(planner).model_fields) - {"planner"}
+    kept = {name: getattr(planner, name) for name in shared}
     try:
         for name, value in fields.items():
             if isinstance(value, Mapping):

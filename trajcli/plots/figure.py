@@ -116,8 +116,8 @@ def _strip(block: PanelBlock, borders: MoveBorders | None) -> float:
 
 def _time_range(block: PanelBlock, borders: MoveBorders | None) -> tuple[float, float]:
     times = [trace.x for panel in block.panels for trace in panel.traces]
-    known = np.concatenate([*times, *([] if borders is None else [borders.times])])
-    low, high = float(known.min()), float(known.max())
+    shown = np.concatenate([*times, *([] if borders is None else [borders.times])])
+    low, high = float(shown.min()), float(shown.max())
     margin = 0.01 * (high - low) if high > low else 0.5
     return low - margin, high + margin
 
@@ -173,14 +173,14 @@ def _draw_panel(frame: PanelFrame, panel: Panel, note: str, *, numbered: bool) -
     frame.y_axis(y_ticks, y_names, panel.y_label)
     if numbered:
         frame.x_axis(x_ticks, x_names, panel.x_label)
-    room = 0.95 * (frame.width - text_width(note, SMALL)) - 0.15
-    frame.titles(shortened(panel.title, NORMAL, room), note, LIMIT_COLOUR)
+    width = 0.95 * (frame.width - text_width(note, SMALL)) - 0.15
+    frame.titles(shortened(panel.title, NORMAL, width), note, LIMIT_COLOUR)
 
 
 def _ticks_with_room(frame: PanelFrame) -> tuple[list[float], list[str]]:
     """Return ticks at x, fewer where their numbers are long, such as times since 1970."""
-    for most in range(_X_TICKS, 0, -1):
-        ticks, names = ticks_of(frame.x, most)
+    for count in range(_X_TICKS, 0, -1):
+        ticks, names = ticks_of(frame.x, count)
         if sum(text_width(name, SMALL) for name in names) <= frame.width:
             break
     return ticks, names
@@ -204,8 +204,8 @@ def _plane_view(panel: Panel) -> tuple[float, float]:
     """Return the range of sd: the law, and as much of its limit as is near."""
     top = max((float(trace.y.max()) for trace in panel.traces), default=1.0)
     limit = np.concatenate([line[:, 1] for line in panel.limits])
-    known = limit[np.isfinite(limit)]
-    high = min(float(known.max()), 2.0 * top) if known.size else top
+    finite = limit[np.isfinite(limit)]
+    high = min(float(finite.max()), 2.0 * top) if finite.size else top
     return 0.0, 1.06 * max(high, top) or 1.0
 
 

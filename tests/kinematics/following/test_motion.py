@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from followed_paths import CASES
 from hermite_curves import hermite_pieces
+from scipy.spatial.transform import Rotation
 
 from trajcli.geometry.paths.chain import join
-from trajcli.geometry.paths.orientation import FixedOrientation
+from trajcli.geometry.paths.orientation import AxisAngleOrientation, FixedOrientation
 from trajcli.geometry.paths.pose import PoseCurve
-from trajcli.geometry.paths.position import Line
-from trajcli.kinematics.following.motion import motion_along
+from trajcli.geometry.paths.position import Line, Pivot
+from trajcli.kinematics.following.motion import ToolMotion, motion_along
 from trajcli.kinematics.following.tolerance import Tolerance
-from trajcli.kinematics.following.tool_path import ToolPath
+from trajcli.kinematics.following.tool_path import ToolPath, ToolReference
 
 CORNER = join([Line([0, 0, 0], [0.3, 0, 0]), Line([0.3, 0, 0], [0.3, 0.4, 0])])
 PATH = ToolPath(PoseCurve(CORNER, FixedOrientation(np.eye(3), CORNER.length)), (True, True, True), "all")
@@ -81,3 +82,47 @@ def test_breaks_of_path_and_law_that_are_one_are_one():
     breaks = motion_along(PATH, through, through.breaks, Tolerance()).breaks
     assert breaks.size == 3
     assert through.evaluate(breaks[1])[0] == pytest.approx(0.3, abs=1e-15)
+
+
+def test_a_motion_in_more_time_is_made_of_what_is_said_of_it_at_the_same_places():
+    """Of x = sin t, with an aim and a pinned joint likewise: each derivative by a factor of time less, from either side."""
+    asked = []
+
+    def reference_at(times, side):
+        asked.append((times.tolist(), side))
+        waves = np.stack([np.sin(times), np.cos(times), -np.sin(times)])
+        first, second = (np.outer(wave, np.arange(1.0, 7.0)) for wave in waves[1:])
+        poses = np.tile(np.eye(4), (times.size, 1, 1))
+        pins = np.stack([waves, 2 * waves], axis=-1)
+        return ToolReference(poses, first, second, (True,) * 3, "yaw", "x", waves.T.copy(), (1, 3), pins)
+
+    law = hermite_pieces(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 0.3, 0.7], [0, 0, 0]])[:, :, None])
+    motion = ToolMotion(None, law, reference_at, law.breaks, Tolerance(), True, "rotation", True)
+    assert motion.length == pytest.approx(0.7)
+    slower = motion.scaled(4.0)
+    assert (slower.law.start, slower.law.end, slower.breaks.tolist()) == (0.0, 8.0, [0.0, 4.0, 8.0])
+    assert slower.length == pytest.approx(0.7)
+    assert (slower.pure_rotation, slower.ruled_by, slower.overlaps) == (True, "rotation", True)
+    times = np.array([-1.0, 2.0, 4.0, 9.0])
+    for side in ("left", "right"):
+        found = slower.reference(times, side)
+        assert asked[-1] == ([0.0, 0.5, 1.0, 2.0], side)
+        t = np.clip(times / 4, 0, 2)
+        waves = np.stack([np.sin(t), np.cos(t) / 4, -np.sin(t) / 16])
+        np.testing.assert_allclose(found.aims, waves.T, rtol=1e-15)
+        np.testing.assert_allclose(found.pins, np.stack([waves, 2 * waves], axis=-1), rtol=1e-15)
+        np.testing.assert_allclose(found.first, np.outer(waves[1], np.arange(1, 7)), rtol=1e-15)
+        np.testing.assert_allclose(found.second, np.outer(waves[2], np.arange(1, 7)), rtol=1e-15)
+
+
+def test_a_motion_along_a_path_knows_the_path_and_what_rules_its_speed():
+    law = stopping(0.0, 0.3, 0.7)
+    motion = motion_along(PATH, law, law.breaks, Tolerance(), "translation")
+    assert (motion.length, motion.ruled_by, motion.pure_rotation) == (
+        pytest.approx(0.7),
+        "translation",
+        False,
+    )
+    turn = AxisAngleOrientation.between(np.eye(3), Rotation.from_rotvec([0, 0, 0.5]).as_matrix(), 0.5)
+    path = ToolPath(PoseCurve(Pivot([0.1, 0.2, 0.3], [0.1, 0.2, 0.3], 0.5), turn), (True, True, True), "all")
+    assert motion_along(path, stopping(0.0, 0.5), np.array([0.0, 1.0]), Tolerance()).pure_rotation
