@@ -1,0 +1,144 @@
+"""Moves in explanations: which are told, in whose units and times, and closed forms that are evaluated again."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from trajcli.job.read import job_from_text
+from trajcli.output.explain import explanation
+from trajcli.planners.planner import Event
+from trajcli.planning.plan import Plan, plan_job
+
+ARM = {"joints": [{"name": "slide", "type": "prismatic"}, {"name": "turn"}, {"name": "still"}]}
+JOB: dict[str, Any] = {
+    "version": 1,
+    "units": {"angle": "deg", "length": "mm"},
+    "robot": ARM,
+    "limits": {"velocity": [200, 60, 60], "acceleration": [400, 90, 90], "jerk": None},
+    "start": {"joints": [100, 10, -5]},
+    "moves": [
+        {"planner": "cycloidal", "to": {"joints": [40, 30, -5]}, "duration": 2},
+        {"planner": "trapezoid", "to": {"joints": [140, -20, -5]}, "synchronize": "none"},
+        {
+            "planner": "spline",
+            "through": [{"joints": [220, 0, -5], "time": 1}],
+            "to": {"joints": [100, 10, -5], "time": 2},
+        },
+    ],
+}
+
+
+@cache
+def planned() -> Plan:
+    return plan_job(job_from_text(json.dumps(JOB)))
+
+
+def test_one_move_is_told_with_what_is_of_the_job_as_a_whole() -> None:
+    """Events of other moves are left out, those of no move are kept; times are those of the job."""
+    events = tuple(Event(f"of {k}", "text", k) for k in (None, 0, 1, 2))
+    plan = replace(planned(), events=events)
+    for move in range(3):
+        told = explanation(plan, move=move)
+        assert [each.index for each in told.moves] == [move]
+        assert [event.kind for event in told.events] == ["of None", f"of {move}"]
+        assert {step.move for step in told.steps} <= {move}
+        assert told.joints == ["slide", "turn", "still"]
+    whole = explanation(plan)
+    assert [each.index for each in whole.moves] == [0, 1, 2]
+    assert len(whole.events) == 4
+    steps = {step.move for step in whole.steps}
+    assert 1 in steps
+    assert any(step.move == 1 for step in explanation(plan, move=1).steps)
+    findings = tuple(Event("of findings", "text", None) for _ in range(1))
+    assert explanation(replace(plan, events=findings), move=2).events[0].message == "text"
+
+
+def value_of(form: str, t: float) -> float:
+    """Return what a formula of the text gives at a time."""
+    text = form.replace(" (", " * (").replace("2 pi t", "2 * pi * t").replace("(2 pi)", "(2 * pi)")
+    return float(eval(text, {"sin": math.sin, "cos": math.cos, "pi": math.pi, "t": t}))
+
+
+def test_a_closed_form_is_the_motion_in_the_units_of_the_job() -> None:
+    """Also backwards, from a start that is not zero; a joint that stands is a number."""
+    move = explanation(planned(), derivatives=True).moves[0]
+    forms = move.closed_form
+    assert forms is not None
+    assert forms["still"] == "-5"
+    for t in (0.0, 0.3, 1.1, 2.0):
+        q = planned().trajectory(t)
+        assert value_of(forms["slide"], t) == pytest.approx(1e3 * q[0], abs=1e-6)
+        assert value_of(forms["turn"], t) == pytest.approx(np.degrees(q[1]), abs=1e-6)
+    rates = move.closed_form_derivatives
+    assert rates is not None
+    assert [len(each) for each in rates.values()] == [2, 2, 2]
+    assert rates["still"] == ["0", "0"]
+    assert rates["slide"][0].startswith("-60 ")
+    assert rates["turn"][0].startswith("20 ")
+    assert explanation(planned()).moves[0].closed_form_derivatives is None
+    assert explanation(planned()).moves[1].closed_form is None
+
+
+def test_each_joint_alone_has_its_duration() -> None:
+    """Slide: 100 mm at 200 mm/s and 400 mm/s^2 is a triangle of 1 s; turn: 50 deg at 60 deg/s and 90 deg/s^2."""
+    move = explanation(planned()).moves[1]
+    assert move.arrivals == pytest.approx({"slide": 1.0, "turn": 50 / 60 + 60 / 90, "still": 0.0})
+    names = {phase.joint for phase in move.phases}
+    assert {"slide", "turn"} <= names
+    ends = {
+        joint: max(phase.end for phase in move.phases if phase.joint == joint) for joint in ("slide", "turn")
+    }
+    assert max(ends.values()) == pytest.approx(move.duration)
+
+
+def test_times_of_a_move_count_from_its_start() -> None:
+    """Breaks, waypoints, and where a joint leaves their range; those of the report count from the job's."""
+    plan = planned()
+    move, start = explanation(plan).moves[2], plan.trajectory.spans[2].start
+    assert move.breaks[0] == 0
+    assert move.breaks[-1] == pytest.approx(2)
+    assert move.waypoints is not None
+    assert [point.time for point in move.waypoints] == pytest.approx([0, 1, 2])
+    assert [point.joints for point in move.waypoints] == [
+        pytest.approx(each) for each in ([140, -20, -5], [220, 0, -5], [100, 10, -5])
+    ]
+    assert [point.units for point in move.waypoints] == [["mm", "deg", "deg"]] * 3
+    assert all(point.missed == pytest.approx([0, 0, 0], abs=1e-9) for point in move.waypoints)
+    assert move.outside
+    for each in move.outside:
+        assert 0 <= each.time <= 2
+        joint = ["slide", "turn", "still"].index(each.joint)
+        q = plan.trajectory(start + each.time)[joint] * (1e3 if each.joint == "slide" else 180 / np.pi)
+        span = [point.joints[joint] for point in move.waypoints]
+        beyond = q - max(span) if each.beyond > 0 else q - min(span)
+        assert beyond == pytest.approx(each.beyond, abs=1e-6)
+
+
+def test_polynomials_are_the_motion_and_come_with_derivatives_where_asked_for() -> None:
+    plan = planned()
+    for move, span in zip(
+        explanation(plan, derivatives=True).moves[1:], plan.trajectory.spans[1:], strict=True
+    ):
+        for joint, (name, pieces) in enumerate(move.polynomials.items()):
+            factor = 1e3 if name == "slide" else 180 / np.pi
+            for piece in pieces:
+                for t in np.linspace(piece.start + 1e-9, piece.end - 1e-9, 3):
+                    wanted = [plan.trajectory(span.start + t, order)[joint] * factor for order in range(3)]
+                    assert piece.velocity is not None
+                    assert piece.acceleration is not None
+                    for order, coefficients in enumerate(
+                        (piece.absolute, piece.velocity, piece.acceleration)
+                    ):
+                        assert np.polyval(coefficients[::-1], t) == pytest.approx(wanted[order], abs=1e-5)
+    assert all(
+        piece.velocity is None
+        for pieces in explanation(plan).moves[1].polynomials.values()
+        for piece in pieces
+    )
