@@ -99,6 +99,8 @@ def test_a_motion_in_more_time_is_made_of_what_is_said_of_it_at_the_same_places(
     law = hermite_pieces(np.array([0.0, 1.0, 2.0]), np.array([[0.0, 0.3, 0.7], [0, 0, 0]])[:, :, None])
     motion = ToolMotion(None, law, reference_at, law.breaks, Tolerance(), True, "rotation", True)
     assert motion.length == pytest.approx(0.7)
+    motion.reference(np.array([-1.0, 1.5, 3.0]))
+    assert asked[-1] == ([0.0, 1.5, 2.0], "right")
     slower = motion.scaled(4.0)
     assert (slower.law.start, slower.law.end, slower.breaks.tolist()) == (0.0, 8.0, [0.0, 4.0, 8.0])
     assert slower.length == pytest.approx(0.7)
