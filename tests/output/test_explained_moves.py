@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from trajcli.job.read import job_from_text
+from trajcli.job.report import Report
 from trajcli.output.explain import explanation
+from trajcli.output.report import report_of
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan, plan_job
 
@@ -142,3 +144,55 @@ def test_polynomials_are_the_motion_and_come_with_derivatives_where_asked_for() 
         for pieces in explanation(plan).moves[1].polynomials.values()
         for piece in pieces
     )
+
+
+def test_findings_of_other_moves_are_left_out() -> None:
+    moves = [{"planner": "quintic", "to": {"joints": [x, 10, -5]}, "duration": 0.2} for x in (140, 100)]
+    plan = plan_job(job_from_text(json.dumps({**JOB, "moves": moves})))
+    assert {finding.move for finding in explanation(plan).findings} == {0, 1}
+    for move in (0, 1):
+        assert {finding.move for finding in explanation(plan, move=move).findings} == {move}
+
+
+def test_higher_limits_are_tried_in_the_moves_that_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[list[int]] = []
+    monkeypatch.setattr(
+        "trajcli.planning.sensitivity.savings_of", lambda plan, moves: tried.append([*moves]) or iter(())
+    )
+    explanation(planned(), move=1, sensitivity=True)
+    explanation(planned(), sensitivity=True)
+    explanation(planned())
+    assert tried == [[1], [0, 1, 2]]
+
+
+def test_all_moves_along_paths_are_compared_with_a_peer_where_that_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[dict[str, bool]] = []
+
+    def reported(plan: Plan, **named: bool) -> Report:
+        asked.append(named)
+        return report_of(plan)
+
+    monkeypatch.setattr("trajcli.output.explain.report_of", reported)
+    for reference in (False, True):
+        explanation(planned(), move=2, reference=reference)
+        assert asked[-1] == {"reference": True, "peers": reference}
+
+
+def test_a_blend_about_the_start_begins_before_the_times_of_the_job() -> None:
+    """By half of its 0.3 s: the zero of the job's times lies there, and `unshifted` counts from it."""
+    move = {
+        "planner": "blends",
+        "through": [{"joints": [120, 20, -5], "time": 1}, {"joints": [100, 10, -5], "time": 2}],
+        "blend_durations": 0.3,
+    }
+    plan = plan_job(job_from_text(json.dumps({**JOB, "moves": [move]})))
+    told = explanation(plan).moves[0]
+    assert told.origin == pytest.approx(0.15)
+    for piece in told.polynomials["slide"]:
+        middle = (piece.start + piece.end) / 2
+        q = 1e3 * plan.trajectory(middle)[0]
+        assert piece.unshifted is not None
+        assert np.polyval(piece.unshifted[::-1], middle - 0.15) == pytest.approx(q, abs=1e-6)
+        assert np.polyval(piece.local[::-1], middle - piece.start) == pytest.approx(q, abs=1e-6)
