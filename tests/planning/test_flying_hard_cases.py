@@ -267,3 +267,17 @@ def test_a_search_takes_little_more_for_each_of_fifty_moves_than_for_each_of_twe
         planned(*program(count))
         each.append(asked[0] / count)
     assert each[1] < 1.25 * each[0]
+
+
+def test_a_limit_of_the_tool_of_a_slide_is_one_of_its_joint_in_a_zone_without_a_limit_of_jerk():
+    """The tool of a slide is as fast as its joint; on the borders its acceleration may be more than in the zone."""
+    slide = {"joints": [{"type": "prismatic"}], "convention": "standard"}
+    there_and_back = to(0.4, zone={"joints": 0.005}), to(0.3)
+    job = {"robot": slide, "start": {"joints": [0]}, "zone": "stop"}
+    of_joint, of_tool = (
+        planned(*there_and_back, **job, limits={"velocity": 0.2, "acceleration": acceleration, "tcp": tcp})
+        for acceleration, tcp in ((0.6, {}), (0.8, {"acceleration": 0.6}))
+    )
+    assert of_tool.flyby is not None
+    assert of_tool.flyby.duration == pytest.approx(of_joint.flyby.duration, rel=1e-5)
+    assert of_tool.flyby.duration < of_tool.flyby.stopping - 0.01

@@ -148,9 +148,7 @@ _COMMON = 1e6  # times larger or smaller than 1 in SI: beyond it closed forms ma
 _SHORT = 1e-6  # of the longest phase: a shorter one may be what rounding leaves of none
 _LONG = 1e-4  # of the longest phase: rounding the ends of such a phase changes its constant by 1e-11
 _SAME = 1e-10  # relative: of states that are the same but for the direction of the velocity
-_HIDDEN = (
-    1e-11  # over velocity and acceleration in ruckig's units: so unlike are states that it takes for alike
-)
+_HIDDEN = 1e-11  # over velocity and acceleration in ruckig's units: so unlike are states it takes for alike
 _MARGINS = (0.0, 1e-14, 1e-13, 5e-13)  # of the acceleration limits: tried in turn where ruckig finds nothing
 
 
@@ -421,7 +419,8 @@ def _call_ruckig(
     wanted.current_velocity = [initial[0] / velocity]
     wanted.current_acceleration = [initial[1] / acceleration]
     wanted.target_velocity = [_inside(problem.final[1] / velocity, lower[0], upper[0])]
-    wanted.target_acceleration = [_inside(problem.final[2] / acceleration, lower[1], upper[1])]
+    reached = problem.final[2] / acceleration if problem.order == 3 else 0.0  # else none is too high
+    wanted.target_acceleration = [_inside(reached, lower[1], upper[1])]
     wanted.min_velocity, wanted.max_velocity = [lower[0]], [upper[0]]
     wanted.min_acceleration, wanted.max_acceleration = [lower[1]], [upper[1]]
     wanted.max_jerk = [min(-lower[2], upper[2])]
