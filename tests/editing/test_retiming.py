@@ -212,6 +212,26 @@ output: {rate: 100, columns: [t, q, qd, qdd, move]}
     assert [stretch.factor for stretch in stretches] == pytest.approx([sqrt(20 / 90)] * 2, rel=2e-4)
 
 
+@pytest.mark.parametrize(("rate", "factor"), [(30, sqrt(1.37394)), (100, 1.0)])
+def test_rows_of_a_plan_that_stand_far_apart_are_stretched(
+    rate: float, factor: float, tmp_path: Path
+) -> None:
+    """The factor of `docs/check.md`, by which the quintics between rows every 1/30 s pass the acceleration."""
+    job = """\
+version: 1
+units: {angle: deg}
+robot: {joints: [{velocity: 60, acceleration: 120}]}
+start: {joints: [0]}
+moves: [{planner: trapezoid, to: {joints: [50]}}]
+output: {rate: %g}
+"""
+    (tmp_path / "job.yaml").write_text(job % rate)
+    kept = kept_limits(str(tmp_path / "job.yaml"), None)
+    motion = read_motion(str(planned(tmp_path / "rows.csv", job % rate)), ReadingOptions())
+    _, (stretch,) = retime(motion, kept.requirements)
+    assert stretch.factor == pytest.approx(factor, rel=1e-4)
+
+
 @pytest.mark.parametrize("fastest", [False, True])
 def test_each_move_by_its_own_factor(fastest: bool, tmp_path: Path) -> None:
     rows, stretches = of_moves(tmp_path, fastest=fastest)
