@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 from tally import Tally
 from tiers import QUICK, few
 
@@ -49,7 +50,7 @@ def few_programmes(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(proven_bound, "_PROGRAMMES", ((0.005, 40),))
 
 
-def planned(*targets: list[float], robot: str = "planar2r", zone: object = 0.02, **fields: object) -> Plan:
+def planned(*targets: list[float], robot: object = "planar2r", zone: object = 0.02, **fields: object) -> Plan:
     limits = fields.pop("limits", {"velocity": 3, "acceleration": 8, "jerk": 60})
     moves = [{"planner": "jerk_limited", "to": {"joints": joints}} for joints in targets]
     for move in moves[:-1] if fields.pop("more_zones", False) else moves[:1]:
@@ -137,6 +138,42 @@ def test_a_programme_that_is_not_solved_proves_nothing(monkeypatch: pytest.Monke
     assert programme.least_duration(whole, 0.9 * chain.duration, chain.duration) > 0.0
     monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: SimpleNamespace(status=4))
     assert programme.least_duration(whole, 0.9 * chain.duration, chain.duration) == 0.0
+
+
+def test_a_programme_in_which_one_method_goes_round_in_circles_is_solved_by_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A carriage of 3 m under an arm of 7 joints made the simplex method do so, for hours: its steps are limited."""
+    chain = chain_of_plan(planned([0.9, 1.25], [1.0, 2.0]))
+    programme = ShareProgramme(chain.chain, 4, 3)
+    box = ShareBox((0.3, 0.3), (0.4, 0.4))
+    expected = programme.least_duration(box, 0.9 * chain.duration, chain.duration)
+    solve = linprog
+
+    def circling(*given: object, method: str, **options: object) -> object:
+        if method == "highs-ds":
+            options["options"] = {**options["options"], "maxiter": 3}
+        return solve(*given, method=method, **options)
+
+    monkeypatch.setattr("scipy.optimize.linprog", circling)
+    found = programme.least_duration(box, 0.9 * chain.duration, chain.duration)
+    assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_joint_that_stands_still_takes_no_part() -> None:
+    """Of a third one that stays the bound is that of the two that move."""
+    two, three = (
+        chain_of_plan(planned(*targets, robot={"joints": len(targets[0])}, zone=zone, start=start))
+        for targets, zone, start in (
+            (([0.9, 1.25], [1.0, 2.0]), {"joints": 0.1}, [0.3, 1.2]),
+            (([0.9, 0.5, 1.25], [1.0, 0.5, 2.0]), {"joints": 0.1}, [0.3, 0.5, 1.2]),
+        )
+    )
+    box = ShareBox((0.3, 0.3), (0.4, 0.4))
+    programmes = [ShareProgramme(chain.chain, 4, 3) for chain in (two, three)]
+    assert programmes[0].columns == programmes[1].columns
+    bounds = [programme.least_duration(box, 0.9 * two.duration, two.duration) for programme in programmes]
+    assert bounds[0] == pytest.approx(bounds[1], rel=1e-9)
 
 
 def states_of(chain: FlownChain, programme: ShareProgramme) -> tuple[np.ndarray, np.ndarray]:

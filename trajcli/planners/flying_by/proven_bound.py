@@ -195,16 +195,19 @@ class ShareProgramme:
         cost[self.columns - 1] = -1.0
         states = np.stack([low * scale, high * scale], axis=1)
         distances = hstack([self._distances, csr_matrix((len(self.variables), 2))])
-        solved: Any = linprog(
+        given = (
             cost,
             hstack([A, csr_matrix(-now[:, None] * sides[:, 1:])]),
             now * sides[:, 0],
             distances,
             np.zeros(len(self.variables)),
             np.concatenate([states, np.stack([box.low, box.high], axis=1)]),
-            method="highs-ds",
-            options={"presolve": False},  # takes longer than it saves
         )
+        # without a presolve, which takes longer than it saves
+        options = {"presolve": False, "maxiter": sum(A.shape)}
+        solved: Any = linprog(*given, method="highs-ds", options=options)
+        if solved.status == 1:  # a third of these steps are enough, or it goes round in circles
+            solved = linprog(*given, method="highs-ipm")
         if solved.status != 0:
             return 0.0  # nothing is known
         y = np.maximum(-solved.ineqlin.marginals, 0.0)
@@ -281,6 +284,8 @@ def _variables(chain: FlyByChain, on_line: int, in_zone: int) -> Iterator[_Varia
     steps = behind.curve.evaluate(corner.joined) - before.curve.evaluate(corner.left)
     slopes = [course.curve.coefficients[0, 0] for course in (before, behind)]
     for joint, step in enumerate(steps.tolist()):
+        if not (step or slopes[0][joint] or slopes[1][joint]):
+            continue  # it may stand still, however long it takes
         bounds = np.stack([limits.of_order(order)[joint] for order in (1, 2, 3)])
         rates = (0, float(slopes[0][joint])), (1, float(slopes[1][joint]))
         yield _Variable(1, step, bounds, in_zone, start, rates)
