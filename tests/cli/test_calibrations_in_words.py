@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from arm_calls import Arms
 
+from trajcli.cli import calibrate
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 
@@ -127,3 +128,44 @@ def test_a_plan_says_how_many_parameters_it_tells(arms: Arms) -> None:
     assert outcome.err.startswith("8 configurations tell 2 of 3 parameters or combinations: O1 ")
     said = [arms.call(*words[:5], "--scale", scale).err.split("condition ")[1] for scale in ("5mm", "5m")]
     assert float(said[0]) != pytest.approx(float(said[1]), rel=1e-3)
+
+
+def test_a_loss_has_its_scale_where_none_is_given(arms: Arms) -> None:
+    measured(0.1, 7)
+    given = arms.json("calibrate", *WORDS, "--loss", "huber", "--loss-scale", "1.5")
+    assert arms.json("calibrate", *WORDS, "--loss", "huber") == given
+    assert arms.json("calibrate", *WORDS, "--loss", "huber", "--loss-scale", "3")["loss"] != given["loss"]
+
+
+def test_remarks_and_what_has_no_deviation(arms: Arms) -> None:
+    items = json.loads(Path("measured.yaml").read_text(encoding="utf-8"))
+    at = forward(load_robot("true.yaml"), np.radians([[*item["joints"][:1], 20, 30] for item in items]))[
+        :, :3, 3
+    ]
+    for item, xyz in zip(items, (1e3 * at).tolist(), strict=True):
+        item["joints"][1:], item["pose"]["xyz"] = [20, 30], xyz
+    Path("measured.yaml").write_text(json.dumps(items), encoding="utf-8")
+    words = ("calibrate", "-r", "arm.yaml", "--free", "j1.theta,j2.theta,j2.a,j2.d", "measured.yaml")
+    outcome, told = arms.call(*words), arms.json(*words)
+    assert told["remarks"]
+    said = " ".join(outcome.err.split())
+    assert all(" ".join(text.split()) in said for text in told["remarks"])
+    lines = [line.split() for line in outcome.out.splitlines()[3:7]]
+    shown = {name: std for name, _, _, _, _, std in lines}
+    assert {name for name, std in shown.items() if std == "-"} == {
+        f"{row['joint']}.{row['name']}" for row in told["parameters"] if row["std"] is None
+    }
+    assert 0 < list(shown.values()).count("-") < 4
+
+
+def test_each_correlation_is_named(arms: Arms, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [("j1", "a"), ("j2", "theta"), ("j3", "d")]
+    ends = [{"joint": joint, "name": name} for joint, name in names]
+    pairs = [
+        {"first": ends[k], "second": ends[k + 1], "value": value} for k, value in enumerate((0.99, -0.98765))
+    ]
+    true = calibrate.calibration_report
+    monkeypatch.setattr(calibrate, "calibration_report", lambda found: {**true(found), "correlations": pairs})
+    lines = arms.call("calibrate", *WORDS).out.splitlines()
+    said = ["correlated: j1.a and j2.theta, 0.990", "correlated: j2.theta and j3.d, -0.988"]
+    assert [line for line in lines if line.startswith("correlated")] == said

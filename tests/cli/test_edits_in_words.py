@@ -118,6 +118,21 @@ def test_a_job_is_retimed_by_planning_it(capfd: Capture) -> None:
     assert extent == "  it takes 1.27323954 s, it took 1 s"
 
 
+def test_each_move_has_its_factor(capfd: Capture) -> None:
+    """A quintic over 30 deg is fastest at 15/8 of 30 / T: 56.25 and 28.125 deg/s, where 45 are allowed."""
+    back = "  - {planner: quintic, to: {joints: 0}, duration: 2}\noutput:"
+    text = JOB.replace("output:", back).replace("[t, q]", "[t, q, qd, qdd, move]")
+    Path("two.yaml").write_text(text, encoding="utf-8")
+    Path("slow.yaml").write_text("units: {angle: deg}\njoints: [{velocity: 45}]\n", encoding="utf-8")
+    assert call(capfd, "plan", "two.yaml", "-o", "two.csv").code == 0
+    outcome = call(capfd, "retime", "two.csv", "--robot", "slow.yaml", "--per-move")
+    assert [line for line in outcome.err.splitlines() if line.startswith("two.csv: ")] == [
+        "two.csv: move 0: stretched, factor 1.25, by the velocity of j1, whose limit is 45 deg/s",
+        "two.csv: move 1: factor 1, its limits are kept as it is",
+    ]
+    assert "  it takes 3.25 s, it took 3 s" in outcome.err
+
+
 @pytest.mark.parametrize(
     ("stretch", "text"),
     [
