@@ -76,3 +76,13 @@ def test_options_of_the_way_need_its_end(arms: Arms) -> None:
         refused = arms.call("pose", TURNED, *words)
         assert (refused.code, refused.out) == (2, "")
         assert f"{words[0]} is about the way to another pose\n  name that pose with --to" in refused.err
+
+
+def test_matrices_go_by_the_triple_that_is_asked_for(arms: Arms) -> None:
+    ends = [
+        Rotation.from_euler("ZYZ", angles).as_matrix().tolist()
+        for angles in ([0.1, 0.5, 0.3], [0.9, 1.1, -0.5])
+    ]
+    start, end = (f"{{matrix: {matrix}}}" for matrix in ends)
+    (told,) = arms.json("pose", start, "--to", end, "--orientation", "euler", "--euler", "ZYZ", "--s", "0.5")
+    assert told["euler"][0] == pytest.approx([0.5, 0.8, -0.1], abs=1e-9)
