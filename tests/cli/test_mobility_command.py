@@ -101,6 +101,13 @@ def test_the_count_is_shown(arms):
     assert "overconstrained by 2" in out
 
 
+def test_the_count_is_shown_with_its_numbers(arms):
+    """Five bars and a slide with two loops: 3 (6 - 1) - 7 x 2 = 1, less one freedom that changes nothing."""
+    out = arms.call("mobility", "--links", "6", "--joints", "1x7", "--space", "planar", "--passive", "1").out
+    assert "lambda = 3 (planar), n = 6 links with the frame, 7 joints, f0 = 1 passive, 2 closed loops" in out
+    assert out.startswith("mobility: 0\n")
+
+
 WRONG = [
     ([], "--links and --joints are missing"),
     (["--links", "4"], "--joints is missing"),
