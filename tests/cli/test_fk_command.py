@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from arm_calls import Arms, cases, ids, robot_file
 
+from trajcli.job.robot import load_robot
+
 HOME = ("0", "-90", "90", "0", "90", "0")
 
 
@@ -302,3 +304,13 @@ def test_rows_of_a_job_say_their_tool_in_the_frame_of_the_job(arms, tmp_path):
     other = arms.call("fk", "-r", job, "-", stdin=head + "0,0,0,-0.6,0,1,0,0,0\n").err
     assert "up to 0.2 m from that of Planar 2R" in other
     assert "JOB" not in other
+
+
+@pytest.mark.parametrize("frame", ["world", "base"])
+def test_the_frame_is_named_with_each_pose(arms, frame):
+    lines = arms.call("fk", "-r", "rp", "0.1", "0.2", "--links", "--frame", frame).out.splitlines()
+    heads = [line for line in lines if line.endswith(":")]
+    assert heads == [
+        f"pose of the tcp of Planar RP in {frame}:",
+        *(f"frame of link {name} in {frame}:" for name in load_robot("rp").joint_names),
+    ]
