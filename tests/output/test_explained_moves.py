@@ -13,6 +13,7 @@ import pytest
 
 from trajcli.job.read import job_from_text
 from trajcli.job.report import Report
+from trajcli.kinematics.forward import forward
 from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
 from trajcli.planners.planner import Event
@@ -196,3 +197,25 @@ def test_a_blend_about_the_start_begins_before_the_times_of_the_job() -> None:
         assert piece.unshifted is not None
         assert np.polyval(piece.unshifted[::-1], middle - 0.15) == pytest.approx(q, abs=1e-6)
         assert np.polyval(piece.local[::-1], middle - piece.start) == pytest.approx(q, abs=1e-6)
+
+
+def test_an_arm_whose_rail_is_pinned_is_singular_where_its_wrist_is_aligned() -> None:
+    """With its fifth joint at zero it moves the tool in five directions; free, the rail would make them six."""
+    rail = {"axis": [1, 0, 0], "velocity": 1, "acceleration": 2, "jerk": 9, "position": [0, 2]}
+    job = {
+        "version": 1,
+        "robot": {"rail": rail, "arm": "ur5e"},
+        "limits": {"acceleration": 3, "jerk": 30},
+        "start": {"joints": [0, 0.3, -1.2, 1.1, 0.2, 0.4, 0.1]},
+        "moves": [{"planner": "hold", "duration": 1}],
+    }
+    robot = job_from_text(json.dumps(job)).robot
+    for bend, singular in ((0.0, True), (0.4, False)):
+        pose = forward(robot, np.array([0.5, 0.3, -1.2, 1.1, 0.2, bend, 0.1]))
+        target = {"matrix": pose.tolist(), "joints": {robot.joint_names[0]: 0.5}}
+        job["moves"] = [{"planner": "quintic", "to": target, "duration": 9}]
+        told = explanation(plan_job(job_from_text(json.dumps(job)))).moves[0].to_pose
+        assert told is not None
+        assert told.joints[0] == pytest.approx(0.5)
+        assert (told.singular, told.rank) == (singular, {"here": 5 if singular else 6, "nearby": 6})
+        assert (told.free_direction is not None) == singular

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from trajcli.plots.figure import figure_of
+from trajcli.plots.legend import MOST_BORDERS
 from trajcli.plots.panel import MoveBorders, Panel, PanelBlock, Picture, Trace
 from trajcli.plots.write import settings
 
@@ -216,3 +217,34 @@ def test_numbers_at_times_since_1970_have_room(start: float, fewest: int) -> Non
     assert len(numbers) >= fewest
     characters = 0.05 * (14 if start else 6)
     assert all(b - a > characters for a, b in pairwise(numbers))
+
+
+@pytest.mark.parametrize(("columns", "inches"), [(1, 6.2), (2, 4.3), (3, 3.2), (4, 2.8), (5, 2.5)])
+def test_panels_are_as_wide_as_their_number_lets_them(columns: int, inches: float) -> None:
+    """And below the lowest there is room for its numbers and the label: 0.55 inches."""
+    block = PanelBlock(tuple(panel(str(k)) for k in range(columns)), columns)
+    for left, right, bottom, _ in boxes(drawn(block)):
+        assert right - left == pytest.approx(inches)
+        assert bottom == pytest.approx(0.55)
+
+
+def test_of_very_many_moves_no_border_is_drawn() -> None:
+    many = MoveBorders(
+        np.linspace(2.0, 6.0, MOST_BORDERS + 1), tuple(range(MOST_BORDERS)), ("",) * MOST_BORDERS
+    )
+    assert lines(drawn(FIVE, borders=many), "borders") == {}
+    fewer = MoveBorders(many.times[1:], many.indices[1:], many.titles[1:])
+    assert len(lines(drawn(FIVE, borders=fewer), "borders")) == 5
+
+
+def test_a_law_above_its_limit_is_shown_whole() -> None:
+    plane = Panel(
+        "plane",
+        "s [m]",
+        "sd [m/s]",
+        (Trace(0, np.array([0.0, 1.0]), np.array([0.0, 2.0])),),
+        (np.array([[0.0, 1.0], [1.0, 0.5]]),),
+    )
+    assert range_of(drawn(PanelBlock((plane,), 1, over_time=False, flat=False)), 0)[1] == pytest.approx(
+        (0.0, 2.12)
+    )
