@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from decimal import ROUND_DOWN, Decimal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -307,6 +308,34 @@ def test_the_mass_that_is_shown_is_the_largest_of_six_digits_that_verifies(
     shown = capsys.readouterr().out.splitlines()[0].rsplit(" ", 2)[1]
     exact = Decimal(repr(mass))
     assert Decimal(shown) == round_down(exact, exact.adjusted() - 5)
+
+
+@pytest.mark.parametrize(
+    ("found", "second"),
+    [
+        (
+            {"mass": 0.0, "joint": "b", "move": 4, "time": 1.25, "effort": -30.5, "limit": -30.0},
+            "with more, b needs -30.5 N m in move 4, t = 1.25 s, its limit is -30 N m",
+        ),
+        ({"mass": 2.0, "joint": "a", "move": 2, "effort": 91.0}, "with more, a needs 91 N m in move 2"),
+        ({"mass": 2.0, "joint": "a", "move": 2, "cause": "it slips"}, "with more, it slips"),
+    ],
+)
+def test_what_binds_is_said_with_its_numbers(
+    found: dict[str, Any],
+    second: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    job = tmp_path / "job.yaml"
+    job.write_text(CARRYING.replace("MASS", "0.5"))
+    capacity = PayloadCapacity(com=None, moves=(2,), **found)
+    monkeypatch.setattr("trajcli.cli.payload.payload_capacity", lambda *_: capacity)
+    assert run_payload(PayloadCommand(job=str(job))) == 0
+    first, line = capsys.readouterr().out.splitlines()
+    assert first.endswith(f" in move 2: {found['mass']:g} kg")
+    assert line == f"  {second}"
 
 
 def round_down(value: Decimal, exponent: int) -> Decimal:
