@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 
 import trajcli
 from tests.cli.running import run
@@ -215,6 +216,27 @@ def test_a_plan_saves_itself_in_every_format(ending: str, tmp_path: Path) -> Non
         name, factor = (f"q{joint + 1}_deg", np.pi / 180) if ending == "csv" else (f"q{joint + 1}", 1.0)
         expected = plan.trajectory(np.minimum(t, plan.trajectory.duration))[:, joint]
         np.testing.assert_allclose(table.column(name) * factor, expected, atol=1e-8)
+
+
+def test_logs_of_save_and_of_batch_have_the_report_of_plan(tmp_path: Path) -> None:
+    """With the event of rows every 1/30 s of a trapezoid that pass its acceleration between them."""
+    job = tmp_path / "job.yaml"
+    job.write_text(
+        "version: 1\nrobot: {joints: [{velocity: 1, acceleration: 2}]}\nstart: {joints: 0}\n"
+        "moves: [{planner: trapezoid, to: {joints: 1}}]\noutput: {rate: 30}\n"
+    )
+    logs = [tmp_path / f"{name}.mcap" for name in ("plan", "save", "job")]
+    assert run("plan", str(job), "-q", "-o", str(logs[0])).code == 0
+    trajcli.plan(job).save(logs[1])
+    assert run("batch", str(job), "-j", "1", "-q", "--format", "mcap").code == 0
+    reports = []
+    for log in logs:
+        with log.open("rb") as stream:
+            attached = make_reader(stream).iter_attachments()
+            reports.append(next(json.loads(each.data) for each in attached if each.name == "report.json"))
+    assert [event["kind"] for event in reports[0]["events"]] == ["joined_over_limit"]
+    assert reports[1] == reports[0]
+    assert reports[2] == reports[0]
 
 
 def test_a_notebook_draws_a_plan():

@@ -214,8 +214,10 @@ def _written(task: Task, setup: BatchSetup, hashed: InputsHash) -> LedgerEntry:
             from trajcli.output.report import verification_error
 
             raise verification_error(plan)
+        from trajcli.output.delivery.joined import as_logged
+
         make_folder(Path(job.output).parent)
-        write_rows(plan, grid, job.output, digits, form=form)
+        write_rows(as_logged(plan, form), grid, job.output, digits, form=form)
     after = hash_of_inputs(Path(job.job).name, content, files, setup.said)
     # where a file has changed meanwhile, nobody knows of which content the rows were made
     kept = hashed.value if after == hashed.value else None

@@ -299,12 +299,12 @@ def _beside(rows: _Rows, plan: Plan, halves: Array, stamps: _Stamps) -> str:
     first, last = stamps.first - plan.loaded.job.output.start_time, stamps.last[1] - stamps.first
     if abs(last - duration) <= 2 * _NANOSECOND:
         return _NO_GRID
-    after = first + last - duration
-    if after > 2 * _NANOSECOND:
-        return f"they last {last:.9g} s, and the motion {duration:.9g} s"
+    others = f"they last {last:.9g} s, and the motion {duration:.9g} s"
+    if first + last - duration > 2 * _NANOSECOND:
+        return others
     part = ListedGrid(duration, rows.kept[:, rows.time] - stamps.first + max(first, 0.0))
     if first < -2 * _NANOSECOND or _first_difference(rows, plan, part, halves, stamps) is not None:
-        return _NO_GRID
+        return others
     return f"they are a part of it alone, from {first:.9g} s to {first + last:.9g} s of {duration:.9g} s"
 
 

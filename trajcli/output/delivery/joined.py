@@ -67,6 +67,13 @@ def with_event(plan: Plan, rows: JoinedRows, form: StreamFormat) -> tuple[Plan, 
     return replace(plan, events=(*plan.events, Event(kind, f"{text}; {cure}"))), judged
 
 
+def as_logged(plan: Plan, form: StreamFormat) -> Plan:
+    """Return a plan with the event of its rows where they stand in a log, which has the report with it."""
+    if form.content != "log" or not plan.verdict.passed:
+        return plan
+    return with_event(plan, joined_rows(plan, grid_of(plan), form), form)[0]
+
+
 def rows_report(rows: JoinedRows, judged: Judgement) -> RowsReport:
     """Return the part of the report about rows, from `with_event`."""
     from trajcli.job.report import RowsReport, WorstOfRows
