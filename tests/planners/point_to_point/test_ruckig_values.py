@@ -169,7 +169,8 @@ def test_only_rounding_is_laid_onto_a_bound() -> None:
 
 @pytest.mark.parametrize("distance", [3.0, 0.2, 1e-3, -3.0, -0.2, -1e-3])
 def test_bounds_that_differ_by_direction_are_those_of_ruckig(distance: float) -> None:
-    for bounds in (UNEVEN, UNEVEN * [[1], [0], [1]] + [[0, 0], [-2, 2], [0, 0]], BOUNDS):
+    mirrored = -UNEVEN[:, ::-1] * [[1], [0], [1]] + [[0, 0], [-2, 2], [0, 0]]
+    for bounds in (mirrored, UNEVEN, UNEVEN * [[1], [0], [1]] + [[0, 0], [-2, 2], [0, 0]], BOUNDS):
         asked = problem((distance, 0, 0), bounds=bounds)
         made = fastest(asked)
         assert made.duration == pytest.approx(own(asked).duration, rel=1e-9)
@@ -230,3 +231,17 @@ def test_a_run_down_is_braked_into_its_bounds_before_it_goes_to_its_velocity(
     unbraked = replace(asked, brake=False)
     assert "brake" not in names(fastest(unbraked))
     assert fastest(unbraked).duration == pytest.approx((2 - 0.3) / 2 + 2 / 10, rel=2e-3)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_where_one_must_last_longer_those_before_and_behind_it_last_as_long(turned: bool) -> None:
+    """In 0.05 m at 0.5 m/s there is no time to stop: what lasts a little longer has to go back first."""
+    asked = [problem((0.0084, 0, 0)), problem((0.05, 0.5, 0), (0, 0.5, 0)), problem((0.008, 0, 0))]
+    asked = asked[::-1] if turned else asked
+    profiles = [fastest(each) for each in asked]
+    quickest = max(each.duration for each in profiles)
+    made = together(asked, profiles)
+    assert made[0].duration > 2 * quickest
+    assert len({each.duration for each in made}) == 1
+    for each, profile in zip(asked, made, strict=True):
+        assert float(profile.curve().evaluate(profile.duration)[0]) == pytest.approx(each.final[0], rel=1e-9)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tiers import few
-from tool_jobs import line, plan, refusal
+from tool_jobs import START, TCP, TO, line, plan, refusal, tool_rates
 
 from trajcli.curves.piecewise import Array, Side, constant
 from trajcli.errors import PlanningError, Problem
@@ -268,3 +268,16 @@ def test_branches_meet_where_no_joint_races(size: float) -> None:
     robot = {"convention": "standard", "joints": [lift, {"a": 2.0 * size}]}
     problem = problem_of(robot, {"joints": [0, 0]}, line({"xyz": [size, 0, 0]}, law=LAW))
     assert "at s = 0 m: there branches of the arm meet" in problem.message
+
+
+@pytest.mark.parametrize(
+    "tolerance", [{"position": 0.02}, {"angle": 0.05}, {"position": 0.02, "angle": 0.05}]
+)
+def test_a_tool_at_a_limit_of_its_rates_keeps_it_whatever_tolerance_is_given(
+    tolerance: dict[str, float],
+) -> None:
+    made = plan("ur5e", START, line(TO, tolerance=tolerance))
+    rates = tool_rates(made, np.linspace(0.0, made.trajectory.duration, 4001)).max(axis=1)
+    limits = [TCP[name] for name in ("speed", "angular_speed", "acceleration", "angular_acceleration")]
+    assert (rates <= np.array(limits) * (1 + 1e-6)).all()
+    assert (rates / limits).max() > 0.99
