@@ -170,7 +170,13 @@ def test_only_rounding_is_laid_onto_a_bound() -> None:
 @pytest.mark.parametrize("distance", [3.0, 0.2, 1e-3, -3.0, -0.2, -1e-3])
 def test_bounds_that_differ_by_direction_are_those_of_ruckig(distance: float) -> None:
     mirrored = -UNEVEN[:, ::-1] * [[1], [0], [1]] + [[0, 0], [-2, 2], [0, 0]]
-    for bounds in (mirrored, UNEVEN, UNEVEN * [[1], [0], [1]] + [[0, 0], [-2, 2], [0, 0]], BOUNDS):
+    for bounds in (
+        mirrored,
+        -UNEVEN[:, ::-1],
+        UNEVEN,
+        UNEVEN * [[1], [0], [1]] + [[0, 0], [-2, 2], [0, 0]],
+        BOUNDS,
+    ):
         asked = problem((distance, 0, 0), bounds=bounds)
         made = fastest(asked)
         assert made.duration == pytest.approx(own(asked).duration, rel=1e-9)
