@@ -159,11 +159,11 @@ def test_rows_through_a_numeric_solver_do_not_jump(arms):
 BAD_ROWS = [
     ("x,y\n1,2\n", 2, "there is no column z"),
     ("x,y,z,qw\n1,2,3,1\n", 2, "there is no column qx, qy, qz"),
-    ("x,y,z,qw,qx,qy,qz\n0.4,0,0.4,1,1,0,0\n", 2, "row 0: the quaternion has length 1.41421"),
+    ("x,y,z,qw,qx,qy,qz\n0.4,0,0.4,1,1,0,0\n", 2, "row 0 (from 0): the quaternion has length 1.41421"),
     (
         "t,x,y,z,qw,qx,qy,qz\n0,0.4,0.1,0.4,1,0,0,0\n0.5,4,0,0.4,1,0,0,0\n",
         3,
-        "row 1 (t = 0.5 s): UR5e cannot",
+        "row 1 (from 0, t = 0.5 s): UR5e cannot",
     ),
     ("x,x_mm,y,z\n1,1,2,3\n", 2, "x and x_mm are columns of the same number"),
 ]

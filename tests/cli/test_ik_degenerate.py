@@ -95,7 +95,7 @@ def test_a_row_out_of_reach_is_named_once(arms):
     outcome = arms.call("ik", "-r", "planar2r", "-", stdin="t,x,y,z\n0,0.4,0,0\n1,0.9,0,0\n")
     assert outcome.code == 3
     reached = "Planar 2R cannot reach the pose: it comes within 0.4 m"
-    assert f"row 1 (t = 1 s): {reached}" in outcome.err
+    assert f"row 1 (from 0, t = 1 s): {reached}" in outcome.err
 
 
 def test_an_option_without_its_value_is_told(arms):

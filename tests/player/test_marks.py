@@ -38,6 +38,14 @@ def test_a_zone_is_a_ball_about_its_corner(cell: dict[str, Any]) -> None:
         assert np.linalg.norm(ends - corner, axis=1).max() == pytest.approx(radius, rel=1e-4)
 
 
+def test_zones_that_are_not_drawn_are_said(cell: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert not [note for note in cell["notes"] if "zones" in note]
+    monkeypatch.setattr("trajcli.player.marks.MOST_ZONES", 1)
+    scene = scene_of_plan(flown_cell())
+    assert scene["zones"] == cell["zones"][:1]
+    assert "Of 2 zones the first 1 are drawn." in scene["notes"]
+
+
 def test_a_zone_says_what_it_uses_of_what_was_asked_and_when_its_corner_is_passed(
     cell: dict[str, Any],
 ) -> None:

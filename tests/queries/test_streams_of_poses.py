@@ -88,7 +88,7 @@ def test_a_row_out_of_reach_is_told_by_its_number_and_time(names: tuple[str, ...
     p[3, 0] = 2.0
     table = np.column_stack([[5, 6, 7, 8.25], p])[:, 4 - len(names) :]
     stream = joints_of(WIDE, blocks(names, *(np.split(table, [split]) if split else [table])), None, 1e-9)
-    when = r"row 3 \(t = 8\.25 s\)" if "t" in names else "row 3:"
+    when = r"row 3 \(from 0, t = 8\.25 s\)" if "t" in names else r"row 3 \(from 0\):"
     with pytest.raises(PlanningError, match=when):
         list(stream.blocks)
 
@@ -132,7 +132,7 @@ def test_rows_that_are_wrong_are_told_by_their_number_in_the_file() -> None:
     for stream in (joints_of, EveryAnswer):
         for bad in (wrong, row * [1, 1, 1, 1, 1.001, 1, 1]):
             made = stream(arm, blocks(names, np.tile(row, (3, 1)), np.vstack([row, bad, wrong])), None, 1e-6)
-            with pytest.raises(InputError, match=r"poses\.csv, row 4: the quaternion has length"):
+            with pytest.raises(InputError, match=r"poses\.csv, row 4 \(from 0\): the quaternion has length"):
                 list(made.blocks if stream is joints_of else made.lines(9))
 
 

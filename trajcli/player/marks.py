@@ -17,7 +17,7 @@ from trajcli.trajectory import Span
 
 _DENSITY = 2700.0  # kg/m^3, of aluminium: a load is drawn as a ball of it
 _RADII = (0.012, 0.35)  # m: a ball is neither lost nor larger than arms are
-_MOST_ZONES = 400  # that are drawn: a page of more would be large
+MOST_ZONES = 400  # that are drawn: a page of more would be large
 
 
 def marks_of(plan: Plan) -> list[dict[str, Any]]:
@@ -43,7 +43,7 @@ def _called(span: Span, plan: Plan) -> str:
 
 def zones_of(plan: Plan) -> list[dict[str, Any]]:
     """Return the zones that are flown: ball, programmed path, times, and a line about each."""
-    zones = () if plan.flyby is None else plan.flyby.zones[:_MOST_ZONES]
+    zones = () if plan.flyby is None else plan.flyby.zones[:MOST_ZONES]
     return [_zone(plan, zone) for zone in zones]
 
 

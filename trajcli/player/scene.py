@@ -346,6 +346,11 @@ def _notes(plan: Plan) -> Iterator[str]:
         yield f"On samples only: {what}, moves {moves}."
     if len(verdict.steps) > _MOST_STEPS:
         yield f"Of {len(verdict.steps)} steps in acceleration the first {_MOST_STEPS} are listed."
+    if plan.flyby is not None and plan.loaded.robot.convention:
+        from trajcli.player.marks import MOST_ZONES
+
+        if len(plan.flyby.zones) > MOST_ZONES:
+            yield f"Of {len(plan.flyby.zones)} zones the first {MOST_ZONES} are drawn."
 
 
 def _counted(count: int, noun: str) -> str:

@@ -275,9 +275,9 @@ def _of_row(
     arm: ArmInUnits, error: PlanningError, block: Array, inputs: _PoseColumns, row: int, done: int
 ) -> PlanningError:
     """Return the error with the row's number and time in front."""
-    when = "" if inputs.time is None else f" (t = {block[row, inputs.time]:.9g} s)"
+    when = "" if inputs.time is None else f", t = {block[row, inputs.time]:.9g} s"
     problems = error.said_by(arm.say).problems
-    return PlanningError(problems[0].within(f"row {done + row}{when}"), *problems[1:])
+    return PlanningError(problems[0].within(f"row {done + row} (from 0{when})"), *problems[1:])
 
 
 def _targets(block: Array, inputs: _PoseColumns, done: int, file: str) -> IkTarget:
@@ -291,7 +291,7 @@ def _targets(block: Array, inputs: _PoseColumns, done: int, file: str) -> IkTarg
     if wrong.size:
         row = int(wrong[0])
         raise InputError(
-            f"{file}, row {done + row}: the quaternion has length {length[row]:.6g} instead of 1",
+            f"{file}, row {done + row} (from 0): the quaternion has length {length[row]:.6g} instead of 1",
             hint=f"the allowed difference is {QUATERNION_DEFECT:g}; the columns are qw, qx, qy, qz",
         )
     return partial_target(position, rotation=matrix_from_quaternion(quaternions))
