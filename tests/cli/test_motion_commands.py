@@ -140,6 +140,43 @@ def test_a_stranger_keeps_names_order_and_units(capfd: Capture) -> None:
     assert out.splitlines()[1:3] == ["0.000,10.000000000,1.500000000", "0.125,15.250000000,2.000000000"]
 
 
+def test_a_message_has_what_the_file_has_and_keeps_its_verdict(capfd: Capture) -> None:
+    """Points of positions alone are joined by straight lines, as rows are; with velocities by cubics."""
+    Path("arm.yaml").write_text(
+        "joints: [{name: lift, type: prismatic, position: [0, 0.2], velocity: 1}, {name: turn, velocity: 100}]\n"
+        "units: {angle: deg}\n"
+    )
+    t = np.arange(11) / 10
+    q = t**3 * (10 - 15 * t + 6 * t**2)
+    qd = 30 * t**2 * (1 - t) ** 2
+    sets = {
+        "t,turn,lift": np.stack([t, 40 * q, 0.1 * q], axis=1),
+        "t,q1,q2,qd1,qd2": np.stack([t, 0.1 * q, 0.7 * q, 0.1 * qd, 0.7 * qd], axis=1),
+    }
+    turned = (np.radians(40), 0.7)  # plain names are in SI
+    for number, (header, rows) in enumerate(sets.items()):
+        np.savetxt("log.csv", rows, "%.9f", ",", header=header, comments="")
+        code, _, err = call(capfd, "convert", "log.csv", "--robot", "arm.yaml", "-o", "goal.yaml")
+        assert code == 0, err
+        message = yaml.safe_load(Path("goal.yaml").read_text())
+        assert message["joint_names"] == ["lift", "turn"]
+        for k, point in enumerate(message["points"]):
+            assert [*point] == ["positions", *["velocities"] * number, "time_from_start"]
+            np.testing.assert_allclose(point["positions"], [0.1 * q[k], turned[number] * q[k]], atol=1e-9)
+        found = [call(capfd, "check", file, "-r", "arm.yaml") for file in ("log.csv", "goal.yaml")]
+        how = "joined by cubics" if number else "joined by straight lines"
+        assert [(each.code, how in each.out) for each in found] == [(0, True)] * 2
+
+
+def test_what_a_message_leaves_out_is_said(capfd: Capture) -> None:
+    Path("log.csv").write_text("t,q1,qdd1,tau1\n0,0,0,1\n1,1,0,2\n2,2,0,3\n")
+    _, _, err = call(capfd, "convert", "log.csv", "--units", "rad", "-o", "goal.yaml")
+    assert [line.split()[2] for line in err.splitlines() if "left out" in line] == ["qdd", "tau"]
+    assert call(capfd, "convert", "-", "-r", "-").err.startswith("error: standard input can be read once")
+    refused = call(capfd, "convert", "log.csv", "-r", "planar2r", "-o", "goal.yaml")
+    assert (refused.code, "1 joint (q1), expected 2" in refused.err) == (2, True)
+
+
 def test_positions_alone_become_a_log_with_a_remark(capfd: Capture) -> None:
     Path("log.csv").write_text("t,q1_deg\n0,0\n1,10\n2,0\n")
     code, _, err = call(capfd, "convert", "log.csv", "-o", "log.mcap")

@@ -85,8 +85,7 @@ def run_concat(options: ConcatCommand) -> int:
     sources = options.files
     if len(sources) < 2:
         raise InputError("concat joins two files at least, and there is one")
-    if sources.count("-") > 1:
-        raise InputError("standard input can be read once")
+    _refuse_two_inputs(sources)
     _check_output(sources, options)
     motions = [_read(source, options) for source in sources]
     found = motions[0]
@@ -104,8 +103,15 @@ def run_convert(options: ConvertCommand) -> int:
     Raises:
         TrajcliError: When anything is wrong; then nothing was written.
     """
-    _check_output([options.file], options)
-    motion = _read(options.file, options, si=options.si)
+    from trajcli.queries.arm import files_of_arm
+
+    if options.robot is None:
+        _check_output([options.file], options)
+        motion = _read(options.file, options, si=options.si)
+    else:
+        _refuse_two_inputs([options.file, options.robot])
+        _check_output([options.file], options, files_of_arm(options.robot))
+        motion = _of_robot(options.file, options.robot, options, si=options.si)
     if options.si:
         motion = replace(motion, columns=plain_columns(motion))
     _write(motion, options)
@@ -125,8 +131,7 @@ def run_retime(options: RetimeCommand) -> int:
     from trajcli.streams.reading import refuse_job
 
     arm = [name for name in (options.job, options.robot) if name is not None]
-    if [options.file, *arm].count("-") > 1:
-        raise InputError("standard input can be read once")
+    _refuse_two_inputs([options.file, *arm])
     _check_output([options.file], options, (file for name in arm for file in files_of_arm(name)))
     if not arm:
         refuse_job(ByteSource(options.file))
@@ -184,6 +189,27 @@ def _read(source: str, options: EditCommand, *, si: bool = False) -> EditedMotio
     """Return the motion of a file, whose units do not matter where its columns stay."""
     units = None if si or format_of(options.output, options.form).si else Units()
     return read_motion(source, options.part(ReadingOptions), declared=units)
+
+
+def _of_robot(source: str, robot: str, options: EditCommand, *, si: bool) -> EditedMotion:
+    """Return the motion of a file in the order, with the names and in the units of a robot's joints."""
+    from trajcli.queries.arm import open_sheet, stated_units
+
+    arm, units = open_sheet(robot).robot, stated_units(robot)
+    if units is None and not si and not format_of(options.output, options.form).si:
+        units = Units()  # which do not matter
+    return read_motion(
+        source,
+        options.part(ReadingOptions),
+        joints=arm.joint_names,
+        joint_types=arm.joint_types,
+        declared=units,
+    )
+
+
+def _refuse_two_inputs(sources: Sequence[str]) -> None:
+    if sources.count("-") > 1:
+        raise InputError("standard input can be read once")
 
 
 def _write(motion: EditedMotion, options: EditCommand) -> None:

@@ -197,6 +197,15 @@ class ConvertCommand(EditCommand):
     example = "trajcli convert rows.csv -o rows.mcap"
 
     file: MotionSource
+    robot: Annotated[
+        str | None,
+        option(
+            "--robot -r",
+            "Whose joints they are: their order, their names in messages and logs, their units.",
+            "NAME|FILE",
+            autocompletion=robot_names,
+        ),
+    ] = None
     si: Annotated[bool, option("--si", "Of a CSV too: columns t, q1, q2, ... in rad and m.")] = False
 
 

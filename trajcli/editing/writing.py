@@ -182,17 +182,20 @@ def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tu
     """Return what a format needs beside rows, and what it makes up or leaves out."""
     if form.content == "rows":
         return WriteOptions(), _note_of_names(motion)
-    missing = [name for name in ORDERS[1:3] if name not in motion.quantities]
+    log, given = form.content == "log", motion.quantities
+    stated = next((order for order, name in enumerate(ORDERS[:3]) if name not in given), 3)
+    missing = [name for name in ORDERS[1:3] if log and name not in given]
     notes = [f"no column {name}: it is of the curve through the rows" for name in missing]
+    held = (*ORDERS[:3], EFFORT) if log else ORDERS[:stated]
     notes += [
         f"the columns {name} are left out: the format is written without them"
-        for name in ("qddd", EFFORT)
-        if name in motion.quantities and (name, form.content) != (EFFORT, "log")
+        for name in given
+        if name not in held
     ]
     notes += ["the column move is left out: the format is written without it"] * motion.writes_moves
     knots = _knots(motion)
     if form.content == "knots":
-        return WriteOptions(goal=lambda: Goal(motion.joint_names, knots)), tuple(notes)
+        return WriteOptions(goal=lambda: Goal(motion.joint_names, knots, stated)), tuple(notes)
     recording = _recording(motion, knots)
     return WriteOptions(recording=lambda: recording), tuple(notes)
 

@@ -39,7 +39,7 @@ class Goal:
     Attributes:
         joint_names: n names.
         knots: With n joints.
-        orders: How many of position, velocity and acceleration its points state.
+        orders: How many of position, velocity and acceleration its points state: 1 to 3.
     """
 
     joint_names: tuple[str, ...]

@@ -30,9 +30,10 @@ _USES = {
 _BILLION = 1_000_000_000
 _BLOCK = 1024  # points written at a time
 _KEYS = ("positions", "velocities", "accelerations")
+_STATED = {1: [True, False, False], 2: [True, True, False], 3: [True, True, True]}
 _NUMBERS = r"\[([^\]]*)\]"
 _POINT = re.compile(
-    rf" *- \{{positions: {_NUMBERS}, velocities: {_NUMBERS}(?:, accelerations: {_NUMBERS})?, "
+    rf" *- \{{positions: {_NUMBERS}(?:, velocities: {_NUMBERS})?(?:, accelerations: {_NUMBERS})?, "
     r"time_from_start: \{sec: ([0-9]+), nanosec: ([0-9]+)\}\}\n"
 )
 
@@ -47,7 +48,7 @@ def write_ros_yaml(
         knots: With n joints.
         out: Where to.
         message: "ros" for JointTrajectory, "ros-goal" for the goal of FollowJointTrajectory.
-        orders: How many of position, velocity and acceleration the points state, 2 or 3.
+        orders: How many of position, velocity and acceleration the points state, 1 to 3.
     """
     out.write("".join(_head(joint_names, message)).encode())
     indent = "  " * (message == "ros-goal")
@@ -77,7 +78,7 @@ def verify_ros_yaml(
     states = (knots.position, knots.velocity, knots.acceleration)[:orders]
     for index, time in enumerate(knots.nanoseconds.tolist()):
         point = _POINT.fullmatch(written.readline().decode(errors="replace"))
-        if point is None or (point[3] is None) != (orders < len(_KEYS)):
+        if point is None or [group is not None for group in point.groups()[:3]] != _STATED[orders]:
             raise TrajcliError(f"point {index} of the file read back is none")
         same = all(
             [float(text) for text in point[k + 1].split(", ")] == rows[index].tolist()
