@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.writing import as_read, plain_columns, write_motion, write_table
@@ -188,3 +189,29 @@ def test_times_of_a_goal_are_the_nearest_nanoseconds(tmp_path: Path, begin: floa
     write_motion(motion, str(tmp_path / "out.yaml"))
     found = read_motion(str(tmp_path / "out.yaml"), ReadingOptions()).rows.t
     assert found.tolist() == [k * 100_000_000 / 10**9 for k in range(9)]
+
+
+@pytest.mark.parametrize(
+    ("names", "stated", "left"),
+    [
+        ("q1", 1, ()),
+        ("q1,tau1", 1, ("tau",)),
+        ("q1,qd1,qddd1", 2, ("qddd",)),
+        ("q1,qd1,qdd1", 3, ()),
+        ("q1,qdd1", 1, ("qdd",)),
+    ],
+)
+def test_a_message_states_what_the_file_states(
+    tmp_path: Path, names: str, stated: int, left: tuple[str, ...]
+) -> None:
+    t = np.arange(5) / 4
+    rows = np.stack([t, *(np.sin(k + 3 * t) for k in range(names.count(",") + 1))], axis=1)
+    text = f"t,{names}\n" + "".join(",".join(f"{x:.9f}" for x in row) + "\n" for row in rows)
+    motion = read(tmp_path / "rows.csv", text)
+    notes = write_motion(motion, str(tmp_path / "goal.yaml"), "ros")
+    assert [note.split()[2] for note in notes] == [*left]
+    points = yaml.safe_load((tmp_path / "goal.yaml").read_text())["points"]
+    keys = ["positions", "velocities", "accelerations"][:stated]
+    for row, point in zip(rows, points, strict=True):
+        assert [*point] == [*keys, "time_from_start"]
+        np.testing.assert_allclose([point[key][0] for key in keys], row[1 : 1 + stated], atol=1e-9)
