@@ -173,6 +173,16 @@ def test_what_a_message_leaves_out_is_said(capfd: Capture) -> None:
     _, _, err = call(capfd, "convert", "log.csv", "--units", "rad", "-o", "goal.yaml")
     assert [line.split()[2] for line in err.splitlines() if "left out" in line] == ["qdd", "tau"]
     assert call(capfd, "convert", "-", "-r", "-").err.startswith("error: standard input can be read once")
+    Path("arm.yaml").write_text("joints: [{name: turn}]\nunits: {angle: deg}\n")
+    refused = call(capfd, "convert", "log.csv", "-r", "arm.yaml", "-o", "arm.yaml")
+    assert (refused.code, "would overwrite the robot's file arm.yaml" in refused.err) == (2, True)
+    refused = call(capfd, "convert", "log.csv", "-r", "ur5e", "--si", "--columns", "q1=q1")
+    assert (refused.code, "1 joint (q1), expected 6" in refused.err) == (2, True)
+    Path("angles.csv").write_text("t,turn\n0,0\n1,90\n")
+    for robot, code in (("arm.yaml", 0), ("turning.yaml", 2)):
+        Path("turning.yaml").write_text("joints: [{name: turn}]\n")
+        told = call(capfd, "convert", "angles.csv", "-r", robot, "--si")
+        assert (told.code, "--units deg" in told.err) == (code, code == 2)
     refused = call(capfd, "convert", "log.csv", "-r", "planar2r", "-o", "goal.yaml")
     assert (refused.code, "1 joint (q1), expected 2" in refused.err) == (2, True)
 
