@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 _BISECTIONS = 20
 _SAMPLES = 17  # of the rest of the path, at which it is asked whether the arm reaches it
 _NEXT = 4e-6  # of the whole: how far beyond the failure the first of them is
+_CLOSER = 6  # times they are drawn closer about the worst: a hole may be as narrow as _NEXT
 _SLOW = (
     20.0  # rad, or lengths of the arm, for each of these: a joint that goes less is not near a singularity
 )
@@ -127,12 +128,11 @@ class FollowingDiagnosis:
         first, last = int(np.argmin(valid)), at
         if first:
             last = self._last_reached(float(samples[first - 1]), float(samples[first]), answers[first - 1])
-        missed = shortfall.max(axis=0)
-        kind = int(missed[1] * characteristic_length(self.robot) > missed[0])
+        missed, kind = self._largest_miss(samples, shortfall)
         amounts: Amounts = {
             "robot": self.robot.name,
             "place": self._s(last),
-            "missed": Amount(float(missed[kind]), 0, None, ("length", "angle")[kind]),
+            "missed": Amount(missed, 0, None, ("length", "angle")[kind]),
         }
         message = "{robot} does not reach the path beyond s = {place}: it stays up to {missed} away"
         hint = "move the path nearer to the arm"
@@ -145,6 +145,18 @@ class FollowingDiagnosis:
             axis = self.reference(samples[:1], "left").tool_axis
             hint += f", or give only the `direction` of the tool's {axis} axis at the target"
         return UnreachablePathError(Problem(message, hint, amounts=amounts))
+
+    def _largest_miss(self, samples: Array, shortfall: Array) -> tuple[float, int]:
+        """Return the largest of what is missed (N, 2) at samples (N,), or between: 0 a length, 1 an angle."""
+        weights = np.array([1.0, characteristic_length(self.robot)])
+        missed = shortfall * weights
+        worst, last = int(missed.max(axis=1).argmax()), len(samples) - 1
+        for _ in range(_CLOSER if worst < last else 0):
+            samples = np.linspace(samples[max(worst - 1, 0)], samples[min(worst + 1, last)], len(samples))
+            missed = self._answers(self.reference(samples, "left"))[1] * weights
+            worst = int(missed.max(axis=1).argmax())
+        kind = int(missed[worst].argmax())
+        return float(missed[worst, kind] / weights[kind]), kind
 
     def _answers(self, reference: ToolReference) -> tuple[list[Array], Array]:
         """Return joint values (k, n) that meet each of N references, and by how much each is missed, (N, 2).
