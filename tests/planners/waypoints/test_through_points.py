@@ -91,14 +91,16 @@ def test_a_target_after_the_recording(tmp_path):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("planner", [*PLANNERS, "waypoints"])
 def test_repeated_rows_are_left_out_and_told(tmp_path, planner):
     text = "q1,q2\n0,0\n0,0\n0.5,0\n0.5,0.0005\n1,1\n1,1\n"
-    made = recorded(tmp_path, text, {"planner": planner})
+    limits = LIMITS if planner in PLANNERS else {**LIMITS, "jerk": 50}
+    made = recorded(tmp_path, text, {"planner": planner}, limits=limits)
     (told,) = [event.message for event in made.events if event.kind == "merged"]
     assert told.startswith("left out 2 of 6 points of ")
     assert told.endswith("points.csv: too near to the one before")
-    made = recorded(tmp_path, text, {"planner": planner, "through": {"csv": "points.csv", "merge": 0.001}})
+    move = {"planner": planner, "through": {"csv": "points.csv", "merge": 0.001}}
+    made = recorded(tmp_path, text, move, limits=limits)
     assert "left out 3 of 6" in made.events[0].message
     np.testing.assert_allclose(made.moves[0].planned.via_points.points, [[0, 0], [0.5, 0], [1, 1]])
 

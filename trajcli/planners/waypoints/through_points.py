@@ -231,8 +231,7 @@ class ThroughPoints(PointSequence):
         self._refuse_another_start(recorded, here, robot)
         kept = recorded.after(here, None if self.to is None else self.to.as_state().position)
         points = self._stacked(start, kept)
-        dropped = len(recorded.positions) - int(recorded.begins_at(here)) - len(kept.positions)
-        return replace(points, events=_merged(dropped, recorded)) if dropped else points
+        return replace(points, events=left_out(recorded, here, kept))
 
     def _refuse_another_start(self, recorded: Recorded, here: Array, robot: Robot) -> None:
         """Refuse a recording that leaves no time to go to its first point."""
@@ -324,11 +323,13 @@ def _at(point: Waypoint, factor: float) -> Waypoint:
     return point if point.time is None else point.model_copy(update={"time": point.time * factor})
 
 
-def _merged(count: int, recorded: Recorded) -> tuple[Event, ...]:
+def left_out(recorded: Recorded, here: Array, kept: Recorded) -> tuple[Event, ...]:
+    """Return the event that not all recorded points after `here` (n,) are kept, or none."""
+    count = len(recorded.positions) - int(recorded.begins_at(here)) - len(kept.positions)
     text = (
         f"left out {count} of {len(recorded.positions)} points of {recorded.file}: too near to the one before"
     )
-    return (Event("merged", text),)
+    return (Event("merged", text),) if count else ()
 
 
 def _without_repeats(points: PointTable) -> PointTable:

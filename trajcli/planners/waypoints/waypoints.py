@@ -30,14 +30,14 @@ from trajcli.language.recorded import Recorded
 from trajcli.language.waypoints import Waypoint
 from trajcli.planners.boundary_states import missing_limit, standstill
 from trajcli.planners.law_events import jerk_events
-from trajcli.planners.planner import Certificate, Planned
+from trajcli.planners.planner import Certificate, Event, Planned
 from trajcli.planners.waypoints.given_points import (
     GivenPoints,
     given_points,
     require_possible,
     without_repeats,
 )
-from trajcli.planners.waypoints.through_points import PointSequence
+from trajcli.planners.waypoints.through_points import PointSequence, left_out
 from trajcli.trajectory import State, ViaPoints
 from trajcli.units import Quantity
 
@@ -225,16 +225,19 @@ class FastestThroughPoints(PointSequence):
         if self.to is not None:
             paths[-1] = ("to",)
         recorded = np.empty((0, start.position.size))
+        events: tuple[Event, ...] = ()
         if isinstance(self.through, Recorded):
             free = replace(self.through, times=None)
             target = None if self.to is None else self.to.as_state().position
-            recorded = free.after(start.position, target).positions
+            kept = free.after(start.position, target)
+            recorded, events = kept.positions, left_out(free, start.position, kept)
         least = self.minimum_durations
         wanted = len(recorded) + len(listed)
         if least is not None and len(least) != wanted:
             message = f"{len(least)} minimum durations, but the recorded points make {wanted} segments"
             raise PlanningError(message, hint="give one for each segment, the first from the start")
-        return given_points(start, recorded, list(zip(paths, listed, strict=True)), least)
+        points = given_points(start, recorded, list(zip(paths, listed, strict=True)), least)
+        return replace(points, events=events)
 
 
 def _of_robot(problem: Problem, joints: NDArray[np.intp]) -> Problem:
