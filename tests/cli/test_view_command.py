@@ -140,10 +140,32 @@ def test_standard_input_is_told_by_what_it_begins_with(
     assert call(capfd, "plot", "-", "-o", "view.svg", stdin=text).code == 0
 
 
-def test_a_job_from_standard_input_is_not_read_twice(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    done = call(capfd, "view", "-", "rows.csv", "-o", "view.html", stdin=TWO)
+def test_standard_input_is_read_once(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """A job of it judges a file as a job in a file does."""
+    named = call(capfd, "view", "two.yaml", "rows.csv", "-o", "view.html")
+    piped = call(capfd, "view", "-", "rows.csv", "-o", "view.html", stdin=TWO)
+    assert (piped.code, piped.err) == (1, named.err.replace("two:", "stdin:"))
+    done = call(capfd, "view", "-", "-", "-o", "view.html", stdin=TWO)
     assert done.code == 2
     assert "standard input can be read once" in done.err
+
+
+@pytest.mark.parametrize("names", [("job.yaml", "rows.csv"), ("rows.csv", "job.yaml")])
+@pytest.mark.parametrize(("rate", "limit", "code"), [(95, 96, 0), (95, 90, 1), (85, 86, 0), (85, 84, 1)])
+def test_a_file_beside_its_job_is_judged_by_the_values_that_are_set(
+    rate: float,
+    limit: float,
+    code: int,
+    names: tuple[str, str],
+    folder: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    (folder / "rows.csv").write_text(f"t,q1_deg,qd1_deg\n0,0,0\n0.5,15,{rate}\n1,30,0\n")
+    setting = ("--set", f"limits.velocity={limit}")
+    done = call(capfd, "view", *names, *setting, "-o", "view.html")
+    assert done.code == call(capfd, "check", "rows.csv", "--job", "job.yaml", *setting).code == code
+    assert (f"reaches {rate} deg/s at t = 0.5 s, its limit is {limit} deg/s" in done.err) == bool(code)
+    assert ("rows.csv: satisfied" in done.err) != bool(code)
 
 
 @pytest.mark.parametrize(

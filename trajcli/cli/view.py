@@ -20,6 +20,7 @@ from trajcli.streams.whole_file import refuse_overwriting, standard_output, whol
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import ViewCommand
+    from trajcli.planning.plan import Plan
 
 
 def run_view(options: ViewCommand) -> int:
@@ -39,14 +40,15 @@ def run_view(options: ViewCommand) -> int:
     if options.override and not any(jobs):
         raise InputError("--set is for jobs, and this is a file of samples", hint="leave it out")
     every = options.every or options.errors == "json"
-    by = options.robot or next((n for n, job in zip(options.sources, jobs, strict=True) if job), None)
-    if len(jobs) > 1 and [by, *options.sources].count("-") > 1:
+    if options.sources.count("-") > 1:
         raise InputError("standard input can be read once", hint="name the file of the job, or of the rows")
+    plans = {name: _planned(name, options) for name, job in zip(options.sources, jobs, strict=True) if job}
+    by = options.robot or next(iter(plans.values()), None)
     shown = [
-        _shown_job(name, options, every)
-        if job
+        _shown_plan(plans[name], options, every)
+        if name in plans
         else _shown_file(name, by, options.output, options.meshes, every=every)
-        for name, job in zip(options.sources, jobs, strict=True)
+        for name in options.sources
     ]
     return _written(shown, options)
 
@@ -90,34 +92,41 @@ def _written(shown: Sequence[_Shown], options: ViewCommand) -> int:
     return 0
 
 
-def _shown_job(name: str, options: ViewCommand, every: bool) -> _Shown:
+def _planned(name: str, options: ViewCommand) -> Plan:
     from trajcli.job.read import files_of, load_job
     from trajcli.output.delivery.delivered import plan_of
 
     loaded = load_job(name, options.override)
     _check_inputs_stay(options.output, files_of(loaded.document))
     with progress(), np.errstate(all="ignore"):  # what is not finite is for the checks to find
-        plan = plan_of(loaded)
-    scene = scene_of_plan(plan, options.meshes)
+        return plan_of(loaded)
+
+
+def _shown_plan(plan: Plan, options: ViewCommand, every: bool) -> _Shown:
+    scene, name = scene_of_plan(plan, options.meshes), plan.loaded.name
     if plan.verdict.passed:
-        return _Shown(scene, f"{loaded.name}: verified, {plan.trajectory.duration:.6g} s", None)
+        return _Shown(scene, f"{name}: verified, {plan.trajectory.duration:.6g} s", None)
     from trajcli.output.report import verification_error
 
-    return _Shown(
-        scene, f"{loaded.name}: not verified", lambda: verification_error(plan, every=every).problems
-    )
+    return _Shown(scene, f"{name}: not verified", lambda: verification_error(plan, every=every).problems)
 
 
 def _shown_file(
-    name: str, robot: str | None, output: str | None, meshes: float, *, every: bool = False
+    name: str, by: str | Plan | None, output: str | None, meshes: float, *, every: bool = False
 ) -> _Shown:
-    from trajcli.output.delivery.delivered import judged_by
+    """Return a file of rows, judged by a job that was planned, or by an arm or a job of that name."""
+    from trajcli.judge.file import CheckOptions
+    from trajcli.output.delivery.delivered import judged_by, judged_file
     from trajcli.player.recorded import scene_of_file
 
     _check_inputs_stay(output, [("the rows of", name)])
     opened = ByteSource(name)
-    checked = None if robot is None else judged_by(opened, robot)
-    scene = scene_of_file(opened, robot, checked, meshes)
+    if by is None or isinstance(by, str):
+        checked = None if by is None else judged_by(opened, by)
+        scene = scene_of_file(opened, by, checked, meshes)
+    else:
+        checked = judged_file(opened, CheckOptions(), by)
+        scene = scene_of_file(opened, by.loaded.robot, checked, meshes)
     said = f"{scene['title']}: {scene['verdict']['text']}, {scene['subtitle']}"
     if checked is None or isinstance(checked, str) or checked.judgement.passed:
         return _Shown(scene, said, None)
