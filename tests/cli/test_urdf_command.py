@@ -147,3 +147,56 @@ def test_a_job_does_not_overwrite_its_urdf(capfd: Capture, tmp_path: Path) -> No
     code, _, err = call(capfd, "plan", job, "--report", tmp_path / "arm.urdf")
     assert code == 2
     assert "would overwrite the robot's file" in err
+
+
+TURN = """\
+<robot name="one"><link name="a"/><link name="b"/><joint name="turn" type="revolute">
+<parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-2" upper="1.5" velocity="1" effort="5"/>
+<safety_controller soft_lower_limit="-1.25" soft_upper_limit="1" k_velocity="1"/></joint></robot>
+"""
+
+
+@pytest.mark.parametrize(("words", "held"), [([], (-2, 1.5)), (["--soft"], (-1.25, 1))])
+def test_soft_limits_tighten_the_ranges_where_they_are_asked_for(
+    words: list[str], held: tuple[float, float], capfd: Capture, tmp_path: Path
+) -> None:
+    file, robot = tmp_path / "arm.urdf", tmp_path / "robot.yaml"
+    file.write_text(TURN)
+    done = call(capfd, "urdf", file, *words, "-o", robot)
+    assert (done.code, done.out, done.err) == (0, "", f"{file}: from link a to link b\n")
+    assert load_robot(robot).limits.position.tolist() == [list(held)]
+
+
+def test_standard_streams_have_names(capfd: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("arm.urdf").write_text(TURN)
+    named = call(capfd, "urdf", "arm.urdf")
+    assert call(capfd, "urdf", "arm.urdf", "-o", "-") == named
+    piped = call(capfd, "urdf", "-", stdin=TURN)
+    assert piped.out == named.out.replace('"arm.urdf"', '"<stdin>"')
+    assert piped.err == named.err.replace("arm.urdf", "<stdin>")
+    assert call(capfd, "urdf", "-", "-o", "robot.yaml", stdin=TURN).code == 0
+    assert Path("robot.yaml").read_text() == piped.out
+    assert not Path("-").exists()
+
+
+def test_a_flaw_of_the_whole_file_stands_at_its_beginning_and_one_of_a_line_at_the_line(
+    capfd: Capture, tmp_path: Path
+) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(TURN)
+    said = "error: the robot has no link 'c' for its tip"
+    assert call(capfd, "urdf", file, "--tip", "c").err.startswith(f"{file}:1:1: {said}\n")
+    assert call(capfd, "urdf", "-", "--tip", "c", stdin=TURN).err.startswith(f"<stdin>:1:1: {said}\n")
+    file.write_text("<robot>\n")
+    assert call(capfd, "urdf", file).err.startswith(f"{file}:2:1: error: the file is no XML")
+
+
+def test_one_more_note_is_no_notes(capfd: Capture, tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(TURN.replace(' effort="5"', ' effort="0"'))
+    (line,) = call(capfd, "urdf", file).err.splitlines()
+    assert line == f"{file}: from link a to link b; 1 more note: -v says them"
+    first, second = call(capfd, "urdf", file, "-v").err.splitlines()
+    assert first == f"{file}: from link a to link b"
+    assert "effort" in second
