@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
+import re
 import subprocess
 from pathlib import Path
 
@@ -150,6 +152,73 @@ def test_standard_input_is_read_once(folder: Path, capfd: pytest.CaptureFixture[
     assert "standard input can be read once" in done.err
 
 
+TITLES = re.compile(rb'"title":"([^"]*)"')
+
+
+@pytest.mark.parametrize("names", [("job.yaml", "fast.yaml"), ("fast.yaml", "job.yaml")])
+def test_of_two_motions_the_first_is_the_one_that_has_all(
+    names: tuple[str, str], folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    done = call(capfd, "view", *names, "-o", "view.html")
+    assert done.code == 1
+    stems = [name.removesuffix(".yaml") for name in names]
+    titles = [title.decode() for title in TITLES.findall((folder / "view.html").read_bytes())]
+    assert titles[:1] == stems[:1]
+    assert stems[1] in titles
+    said = {"job": "job: verified, 1 s", "fast": "fast: not verified"}
+    assert done.err.startswith(f"{said[stems[0]]}; {said[stems[1]]}, view.html (")
+    assert done.err.splitlines()[0].endswith("; the page shows the findings")
+
+
+def test_errors_of_both_motions_are_told(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (folder / "rows.csv").write_text("t,q1_deg,qd1_deg\n0,0,0\n0.5,15,95\n1,30,0\n")
+    quick = JOB.replace("duration: 1", "duration: 0.5")
+    (folder / "quick.yaml").write_text(quick)
+    for names, rates in (
+        (("fast.yaml", "quick.yaml"), (225, 112.5)),
+        (("quick.yaml", "rows.csv"), (112.5, 95)),
+    ):
+        err = call(capfd, "view", *names, "-o", "view.html").err
+        assert [f"reaches {rate} deg/s" in err for rate in rates] == [True, True]
+    alone = call(capfd, "view", "rows.csv", "-r", "job.yaml", "-o", "view.html")
+    assert alone.code == 1
+    assert "the page shows" not in alone.err
+    done = call(capfd, "view", "job.yaml", "-o", "view.html")
+    assert (done.code, "the page shows" in done.err) == (0, False)
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_a_page_shows_two_at_most(count: int, folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    names = ("job.yaml", "rows.csv", "fast.yaml", "two.yaml")[:count]
+    done = call(capfd, "view", *names, "-o", "view.html")
+    assert (done.code, done.out) == (2, "")
+    assert f"a page shows one motion or two, and {count} are named" in done.err
+    assert "  trajcli view job.yaml rows.csv\n" in done.err
+    assert not (folder / "view.html").exists()
+
+
+@pytest.mark.parametrize("source", ["job", "rows"])
+def test_programs_are_told_every_finding(
+    source: str, folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "two.yaml").write_text(TWO + "limits: {velocity: 1}\n")
+    (folder / "rows.csv").write_text("t,q1,q2,qd1,qd2\n0,0,0,0,0\n0.5,0.5,0.5,1.5,1.5\n1,1,1,0,0\n")
+    words = ["two.yaml"] if source == "job" else ["rows.csv", "-r", "two.yaml"]
+    done = call(capfd, "view", *words, "--errors", "json", "-o", "view.html")
+    problems = json.loads(done.err[done.err.index("{") :])["problems"]
+    speeds = [each["joint"] for each in problems if "the velocity of" in each["message"]]
+    assert (done.code, speeds) == (1, ["j1", "j2"])
+    plain = call(capfd, "view", *words, "-o", "view.html").err
+    assert "(and 1 more like it: --all)" in plain
+    assert "(and 1 more" not in call(capfd, "view", *words, "--all", "-o", "view.html").err
+
+
+def test_an_arm_is_for_files(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    done = call(capfd, "view", "two.yaml", "-r", "planar2r", "-o", "view.html")
+    assert (done.code, "two.yaml is a job, and no motion yet" in done.err) == (2, True)
+    assert not (folder / "view.html").exists()
+
+
 @pytest.mark.parametrize("names", [("job.yaml", "rows.csv"), ("rows.csv", "job.yaml")])
 @pytest.mark.parametrize(("rate", "limit", "code"), [(95, 96, 0), (95, 90, 1), (85, 86, 0), (85, 84, 1)])
 def test_a_file_beside_its_job_is_judged_by_the_values_that_are_set(
@@ -229,6 +298,17 @@ def test_inputs_stay(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert done.code == 2
     assert "would overwrite the job job.html" in done.err
     assert (folder / "job.html").read_text() == TWO
+
+
+def test_rows_stay_and_a_dash_is_no_file(folder: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (folder / "rows.html").write_text(CSV)
+    done = call(capfd, "view", "rows.html", "-o", "./rows.html")
+    assert (done.code, "would overwrite the rows of rows.html" in done.err) == (2, True)
+    assert (folder / "rows.html").read_text() == CSV
+    piped = call(capfd, "view", "-", "-o", "-", stdin=CSV)
+    assert (piped.code, piped.out[:9]) == (0, "<!doctype")
+    assert piped.err.startswith(f"stdin: not judged, 3 rows · 1 s, {len(piped.out.encode()) / 1e6:.2f} MB")
+    assert not (folder / "-").exists()
 
 
 def test_a_terminal_gets_a_hint_and_no_page(folder: Path) -> None:

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from planning.test_payload_capacity import CARRYING, EMPTY, FREE, HEAD, LAST, verifies
 from tiers import few
 
-from trajcli.errors import InputError, TrajcliError
+from trajcli.cli.job_commands import PayloadCommand
+from trajcli.cli.payload import run_payload
+from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.errors import InputError, TrajcliError, VerificationError
 from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.kinematics.robot import Payload, point_mass
 from trajcli.planning.payload_capacity import Carried, PayloadCapacity, payload_capacity
 from trajcli.planning.plan import Plan, plan_job
 
@@ -139,3 +146,116 @@ def test_where_gravity_alone_binds_its_time_is_that_of_the_pose(target: Sequence
     plan = plan_job(job_from_text(text))
     reached = np.degrees(plan.trajectory.curve.evaluate(np.array([found.time]))[0])
     assert reached == pytest.approx(target, abs=6)
+
+
+@pytest.mark.parametrize("further", [0, 1])
+def test_of_two_joints_over_their_limits_the_one_that_is_further_over_binds(further: int) -> None:
+    """A gripper that takes thrice as much as soon as it takes more than two kilograms, in a horizontal plane."""
+    text = (
+        HEAD.replace("[0, -9.81, 0]", "[0, 0, -9.81]") + "limits: {effort: LIMITS}\nstart: {joints: [0, 0]}\n"
+    )
+    text += "moves:\n  - {planner: quintic, to: {joints: [90, 60]}, duration: 2}\n"
+
+    def planned(loaded: LoadedJob, carried: Carried) -> Plan:
+        def taken(index: int, payload: Payload | None) -> Payload:
+            given = carried(index, payload) or point_mass(0.0)
+            return point_mass(3.0 * given.mass if given.mass > 2 else given.mass)
+
+        return plan_job(loaded, taken, advise=False)
+
+    plan = plan_job(job_from_text(text.replace("LIMITS", "9000")))
+    rows = [plan.trajectory(np.linspace(0, 2, 2001), order) for order in range(3)]
+    peaks = {
+        mass: np.abs(InverseDynamics(replace(plan.loaded.robot, payload=point_mass(mass))).effort(*rows)).max(
+            axis=0
+        )
+        for mass in (2.0, 6.0)
+    }
+    limits = np.where(np.arange(2) == further, peaks[2.0], 0.5 * (peaks[2.0] + peaks[6.0]))
+    found = payload_capacity(job_from_text(text.replace("LIMITS", str(limits.tolist()))), planned=planned)
+    shares = peaks[6.0] / limits
+    assert shares[further] > shares[1 - further] > 1.1
+    assert found.mass == pytest.approx(2.0, rel=1e-4)
+    assert found.joint == "ab"[further]
+    assert abs(found.effort or 0) == pytest.approx(peaks[6.0][further], rel=1e-3)
+
+
+@pytest.mark.parametrize("move", [0, 1, 2])
+def test_a_job_that_does_not_verify_empty_says_where(move: int) -> None:
+    lines = EMPTY.splitlines()
+    row = next(k for k, line in enumerate(lines) if "planner" in line) + move
+    lines[row] = lines[row][: lines[row].index("duration")] + "duration: 0.6}"
+    text = "\n".join(lines).replace("limits: {effort: {a: 90, b: [-40, 30]}}", "limits: {effort: 9000}")
+    with pytest.raises(VerificationError, match="does not verify even without the payload") as refused:
+        payload_capacity(job_from_text(text, "job.yaml"))
+    (problem,) = refused.value.problems
+    (worst,) = [each for each in plan_job(job_from_text(text)).verdict.findings[:1] if each.move == move]
+    assert (problem.move, problem.joint, problem.time) == (move, worst.joint, worst.time)
+    assert problem.place is not None
+    assert (problem.place.file, problem.place.line) == ("job.yaml", row + 1)
+
+
+def test_what_is_missing_is_said_at_its_place() -> None:
+    text = EMPTY.replace("effort: {a: 90, b: [-40, 30]}", "velocity: 90")
+    with pytest.raises(InputError, match="no limit of effort is in force") as refused:
+        payload_capacity(job_from_text(text, "job.yaml"))
+    (problem,) = refused.value.problems
+    assert problem.place is not None
+    line = text.splitlines()[problem.place.line - 1]
+    assert line.startswith("limits:")
+    with pytest.raises(InputError) as refused:
+        payload_capacity(job_from_text(EMPTY), 3)
+    assert refused.value.problems[0].hint == "its moves are 0 to 2"
+
+
+def _told(job: Path, capsys: pytest.CaptureFixture[str], **options: Any) -> list[str]:
+    """Return the lines that the command prints."""
+    assert run_payload(PayloadCommand(job=str(job), **options)) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+@pytest.mark.parametrize("output", ["", "output: {for: ros-jtc, rate: 50}\n"])
+def test_the_command_seeks_what_is_carried_in_a_move_with_the_values_that_are_set(
+    output: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pose, coms, limits = (0, 20), ((0.06, 0.02), (0.0, 0.3)), np.array([90, 30])
+    text = HEAD + "limits: {effort: {a: 90, b: 30}}\nstart: {joints: [0, 20]}\nmoves:\n"
+    for x, y in coms:
+        text += f"  - {{attach: {{mass: 1, com: [{1e3 * x}, {1e3 * y}, 0]}}}}\n"
+        text += "  - {planner: hold, duration: 0.1}\n  - {detach: {}}\n"
+    job = tmp_path / "job.yaml"
+    job.write_text(text + output, encoding="utf-8")
+    for move, com in ((1, coms[0]), (4, coms[1]))[: 1 if output else 2]:
+        own, each = torques(pose, com)
+        (line, _) = _told(job, capsys, at=move)
+        assert float(line.split()[-2]) == pytest.approx(((limits - own) / each).min(), rel=1e-5)
+        assert f" in move {move}: " in line
+    if output:
+        return
+    own, each = torques(pose, (0.2, 0))
+    set_to = ["moves.0.attach.com=[200, 0, 0]", "limits.effort.a=70"]
+    (line, _) = _told(job, capsys, at=1, override=set_to)
+    assert float(line.split()[-2]) == pytest.approx(((np.array([70, 30]) - own) / each).min(), rel=1e-5)
+    assert "[200, 0, 0] mm of the tcp" in line
+
+
+def test_what_a_slide_holds_is_a_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    job = tmp_path / "job.yaml"
+    job.write_text(
+        """\
+version: 1
+robot:
+  convention: standard
+  joints:
+    - {name: turn, velocity: 1, link: {mass: 1, com: [0, 0, 0], inertia: [0.1, 0.1, 0.1, 0, 0, 0]}}
+    - {name: lift, type: prismatic, velocity: 1, link: {mass: 2, com: [0, 0, 0], inertia: [0.1, 0.1, 0.1, 0, 0, 0]}}
+limits: {effort: {turn: 10, lift: 100}}
+start: {joints: [0, 0.2]}
+moves: [{planner: hold, duration: 1}]
+""",
+        encoding="utf-8",
+    )
+    first, second = _told(job, capsys)
+    assert float(first.split()[-2]) == pytest.approx(100 / 9.81 - 2, rel=1e-5)
+    assert "lift needs 100 N in move 0" in second
+    assert second.endswith("its limit is 100 N")
