@@ -234,7 +234,7 @@ def test_a_file_beside_its_job_is_judged_by_the_values_that_are_set(
     done = call(capfd, "view", *names, *setting, "-o", "view.html")
     assert done.code == call(capfd, "check", "rows.csv", "--job", "job.yaml", *setting).code == code
     assert (f"reaches {rate} deg/s at t = 0.5 s, its limit is {limit} deg/s" in done.err) == bool(code)
-    assert ("rows.csv: satisfied" in done.err) != bool(code)
+    assert ("rows.csv: satisfied, robot · 3 rows" in done.err) != bool(code)
 
 
 @pytest.mark.parametrize(
