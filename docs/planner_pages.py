@@ -106,8 +106,9 @@ def planner_table() -> str:
 
 
 def _continuity(name: str, chapter: str) -> str:
-    if name == "spline":
-        return "1 or 2, by rule"
+    choices = {"spline": "1 or 2, by rule", "time_optimal": "2 within limits of jerk, or 1"}
+    if name in choices:
+        return choices[name]
     return "1 or 2, by law" if chapter == "tool_path" else str(PLANNERS[name].continuity)
 
 
