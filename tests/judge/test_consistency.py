@@ -355,6 +355,18 @@ def test_a_position_jumps_whatever_limits_of_acceleration_say(side: int) -> None
     assert [(each.kind, each.quantity, each.row) for each in found] == [("jump", "position", 12)]
 
 
+@SIDES
+def test_two_rows_that_say_nothing_else_are_a_motion_that_is_too_fast(side: int) -> None:
+    """2 rad in 1 s, where 1.5 rad/s are allowed; a column of velocities that says rest makes it a jump."""
+    q, t, still = np.array([0.0, side * 2.0]), np.array([0.0, 1.0]), np.zeros(2)
+    limits = replace(unlimited(1), velocity=np.array([[-1.5, 1.5]]))
+    judgement = judge_motion(lambda: [rows(q, t=t)], Requirements(bare_robot(limits)))
+    assert [(each.kind, each.value) for each in judgement.errors] == [("velocity", side * 2.0)]
+    assert [each.kind for each in inconsistent(rows(q, still, t=t), limits)] == ["jump"]
+    three = rows(np.array([0.0, side * 2.0, side * 2.0]), t=np.arange(3.0))
+    assert [each.kind for each in inconsistent(three, limits)] == ["jump"]
+
+
 @pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])
 def test_values_in_single_precision_are_rounded_by_a_share_of_each(share: float, broken: bool) -> None:
     """At 100 rad by 6e-6 in turns, up and down; the rate is zero throughout."""

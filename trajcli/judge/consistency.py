@@ -95,6 +95,8 @@ class Changes:
         own = sizes[_NEAR].copy()
         largest = (own > 0.0) & (own >= sizes.max(axis=0))
         alone = np.sort(sizes, axis=0)[-3] * _ISOLATED <= own
+        if len(values) == 1 and self.stated is None:  # nothing says that it is no motion, and a fast one
+            alone[:] = False
         if self.order == 0 and len(values) == 2:  # nothing else tells a jump from a motion that goes on
             alone &= np.abs(steps.sum(axis=0)) * _ISOLATED <= own * (_ISOLATED + 1)
         return np.asarray(largest & alone)
