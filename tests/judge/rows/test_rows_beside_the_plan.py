@@ -125,6 +125,17 @@ def test_full_digits_are_off_by_what_no_processor_makes(column: int, plan: Plan,
     assert compared(tmp_path, plan, rows, ".17g").planned
 
 
+@pytest.mark.parametrize("off", [0.4e-9, -0.4e-9, 3e-9, -3e-9])
+def test_exact_stamps_may_have_been_rounded_to_nanoseconds_before(
+    off: float, plan: Plan, tmp_path: Path
+) -> None:
+    """Rows at the rate 1/0.15 Hz, whose last stamp is not one of the grid, of a file that was converted."""
+    for row in (1, -2, -1):
+        rows = rows_at(1 / 0.15)
+        rows[row, 0] += off
+        assert compared(tmp_path, plan, rows, ".17g").planned is (abs(off) < 1e-9)
+
+
 def in_milliseconds(folder: Path, plan: Plan, rows: Rows) -> RowComparison:
     """Return what a comparison says of rows whose stamps show three decimals, and values nine."""
     lines = (",".join([f"{row[0]:.3f}", *(f"{value:.9f}" for value in row[1:])]) for row in rows.tolist())

@@ -65,6 +65,11 @@ class _Stamps:
     last: tuple[float, float]
     rounding: float
 
+    @property
+    def doubt(self) -> float:
+        """By how much two of them may be off, s: those of exact numbers were perhaps converted from a CSV."""
+        return 2 * max(self.rounding, _NANOSECOND)
+
 
 @frozen
 class _Rows:
@@ -262,7 +267,7 @@ def _rates(plan: Plan, stamps: _Stamps) -> Iterator[float]:
         return
     period = (stamps.last[0] - stamps.first) / (count - 2)
     largest = max(abs(stamps.first), abs(stamps.last[1]))
-    off = (2 * stamps.rounding + _ULPS * float(np.spacing(largest))) / (count - 2)
+    off = (stamps.doubt + _ULPS * float(np.spacing(largest))) / (count - 2)
     if period <= 2 * off:
         return
     asked = plan.loaded.job.output.rate
@@ -335,7 +340,7 @@ def _stands_on(rows: _Rows, grid: Grid, stamps: _Stamps) -> bool:
     for block, (times, _) in zip(rows.blocks(), grid.blocks(_ROWS), strict=True):
         t = block[:, rows.time]
         shift = float(t[0] - times[0]) if shift is None else shift
-        slack = 2 * stamps.rounding + _ULPS * np.spacing(np.abs(t) + abs(shift))
+        slack = stamps.doubt + _ULPS * np.spacing(np.abs(t) + abs(shift))
         if (np.abs(t - times - shift) > slack).any():
             return False
     return True
