@@ -61,7 +61,9 @@ def test_a_path_that_is_lost_before_it_is_out_of_reach_says_where_the_reach_ends
 def test_a_path_through_a_hole_of_the_workspace_is_missed_by_its_middle() -> None:
     """Links of 0.6 and 0.4 m reach no nearer than 0.2 m, and the line comes as near as 0.1 m."""
     start = {"xyz": [0.5, 0.1, 0], "configuration": UP}
-    place, _, missed, _ = said(problem_of(HOLLOW, start, straight(-0.5, 0.1)), REACH)
+    problem = problem_of(HOLLOW, start, straight(-0.5, 0.1))
+    assert "nearer" not in (problem.hint or ""), "it is too near"
+    place, _, missed, _ = said(problem, REACH)
     assert float(place) == pytest.approx(0.5 - np.sqrt(0.2**2 - 0.1**2), abs=1e-5)
     assert float(missed) == pytest.approx(0.1, rel=1e-6)
 

@@ -28,7 +28,7 @@ def test_freeing_the_orientation_is_proposed_where_it_helps(by, helps):
     start = {"joints": JOINTS}
     error = refusal("elbow4r", start, line({"matrix": matrix.tolist()}, law=LAW), limits=FREE)
     assert ("`direction`" in error.problems[0].advice()) == helps
-    assert "move the path nearer to the arm" in error.problems[0].advice()
+    assert "move the path into the reach of the arm" in error.problems[0].advice()
     to = {"xyz": xyz.tolist(), "direction": rotation[:, 2].tolist(), "tool_axis": "z"}
     if helps:
         plan("elbow4r", start, line(to, law=LAW), limits=FREE)

@@ -135,7 +135,7 @@ class FollowingDiagnosis:
             "missed": Amount(missed, 0, None, ("length", "angle")[kind]),
         }
         message = "{robot} does not reach the path beyond s = {place}: it stays up to {missed} away"
-        hint = "move the path nearer to the arm"
+        hint = "move the path into the reach of the arm"
         if reference.pinned:
             names = ", ".join(self.robot.joint_names[joint] for joint in reference.pinned)
             message = f"with {names} as it is pinned, {message}"
