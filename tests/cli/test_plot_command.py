@@ -217,3 +217,74 @@ def test_a_file_that_cannot_be_judged_is_drawn_and_said(here: Path, capfd: Captu
     assert remark.startswith("rows.csv is not judged: ")
     assert written == "job.svg written"
     assert call(capfd, "plot", "rows.csv", "job.yaml", "-q") == (0, "", "")
+
+
+def test_two_jobs_are_drawn_over_each_other_and_both_are_refused(here: Path, capfd: Capture) -> None:
+    (here / "fast.yaml").write_text(FAST)
+    (here / "quick.svg").write_text(JOB.replace("duration: 1", "duration: 0.5"))
+    code, _, err = call(capfd, "plot", "fast.yaml", "quick.svg", "-o", "a.svg")
+    assert (code, err.splitlines()[0]) == (1, "a.svg written")
+    assert [f"reaches {rate} deg/s" in err for rate in (225, 112.5)] == [True, True]
+    text = (here / "a.svg").read_text()
+    assert "fast: NOT VERIFIED, 1 finding, 0.25 s; quick: NOT VERIFIED, 1 finding, 0.5 s" in text
+    assert 'id="panel0-source1"' in text
+    code, _, err = call(capfd, "plot", "job.yaml", "quick.svg", "-o", "quick.svg")
+    assert (code, "would overwrite the job quick.svg" in err) == (2, True)
+
+
+def test_every_file_that_exceeds_the_job_is_refused(here: Path, capfd: Capture) -> None:
+    for name, rate in (("one.csv", 95), ("two.csv", 96)):
+        (here / name).write_text(PEAK.format(rate=rate))
+    code, _, err = call(capfd, "plot", "one.csv", "two.csv", "job.yaml", "-o", "a.svg")
+    assert code == 1
+    assert [f"{name}: the velocity of j1" in err for name in ("one.csv", "two.csv")] == [True, True]
+    assert "one.csv: EXCEEDED, 1 finding; two.csv: EXCEEDED, 1 finding" in (here / "a.svg").read_text()
+
+
+@pytest.mark.parametrize("files", [("two.yaml",), ("pair.csv", "slow.yaml")])
+def test_every_finding_is_told_where_it_is_asked_for(
+    files: tuple[str, ...], here: Path, capfd: Capture
+) -> None:
+    two = JOB.replace("[{velocity: 90}]", "[{velocity: 90}, {velocity: 90}]")
+    (here / "slow.yaml").write_text(two)
+    (here / "two.yaml").write_text(two.replace("duration: 1", "duration: 0.25"))
+    (here / "pair.csv").write_text(
+        "t,q1_deg,q2_deg,qd1_deg,qd2_deg\n0,0,0,0,0\n0.5,15,15,95,95\n1,30,30,0,0\n"
+    )
+    told = {}
+    for options in ((), ("--all",), ("--errors", "json")):
+        code, _, err = call(capfd, "plot", *files, "-q", "-o", "a.svg", *options)
+        assert code == 1
+        told[options] = [f"the velocity of {joint} reaches" in err for joint in ("j1", "j2")]
+    assert told == {(): [True, False], ("--all",): [True, True], ("--errors", "json"): [True, True]}
+
+
+def test_messages_that_name_their_joints_are_drawn_by_these_names(here: Path, capfd: Capture) -> None:
+    (here / "pair.yaml").write_text(
+        "version: 1\nrobot: {joints: [{name: up, velocity: 9}, {name: out, velocity: 9}]}\n"
+        "start: {joints: [0, 0]}\nmoves: [{planner: cubic, to: {joints: [1, 2]}, duration: 1}]\n"
+    )
+    ros = "joint_names: [NAMES]\npoints:\n"
+    for second, q in ((0, (0, 0)), (1, (1, 2))):
+        ros += f"- {{positions: [{q[0]}, {q[1]}], velocities: [0, 0], time_from_start: {{sec: {second}, nanosec: 0}}}}\n"
+    swapped = ros.replace("NAMES", "out, up").replace("[1, 2]", "[2, 1]")
+    drawn = []
+    for text in (ros.replace("NAMES", "up, out"), swapped):
+        (here / "rows.yaml").write_text(text)
+        assert call(capfd, "plot", "rows.yaml", "pair.yaml", "-q", "-o", "a.svg") == (0, "", "")
+        drawn.append((here / "a.svg").read_bytes())
+    assert drawn[0] == drawn[1]
+
+
+def test_a_third_job_is_advised_as_rows(here: Path, capfd: Capture) -> None:
+    for name in ("b.yaml", "c.yaml"):
+        (here / name).write_text(JOB)
+    code, _, err = call(capfd, "plot", "job.yaml", "b.yaml", "c.yaml")
+    assert (code, "trajcli plan c.yaml -o rows.csv" in err) == (2, True)
+
+
+def test_joints_are_names_beside_standard_input(here: Path, capfd: Capture) -> None:
+    done = call(capfd, "plot", "-", "--joints", "j1", "-o", "a.svg", stdin=JOB)
+    assert (done.code, done.err) == (0, "a.svg written\n")
+    (here / "two").write_text(JOB)
+    assert call(capfd, "plot", "two", "--joints", "j1", "-q", "-o", "b.svg").code == 0  # it is there
