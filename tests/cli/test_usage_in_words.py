@@ -1,0 +1,130 @@
+"""What the application says of a command line that it does not understand, for people and for programs."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from running import EXAMPLES, call
+
+from trajcli.cli.command import CommandLine
+from trajcli.cli.job_commands import PayloadCommand
+
+Capture = pytest.CaptureFixture[str]
+JOB = str(EXAMPLES / "cubic.yaml")
+
+
+@pytest.mark.parametrize("word", ["validate", "Validate", "VERIFY"])
+def test_a_command_of_another_name_in_any_case(word: str, capfd: Capture) -> None:
+    code, out, err = call(capfd, word, JOB)
+    assert (code, out) == (2, "")
+    assert f"No such command '{word}': here it is `trajcli plan JOB --no-output`." in " ".join(err.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "form"),
+    [
+        (("--errors", "json"), "json"),
+        (("--errors=json",), "json"),
+        (("--errors", "github"), "github"),
+        (("--errors=junit",), "junit"),
+        (("--errors", "sarif"), "sarif"),
+    ],
+)
+def test_errors_of_usage_have_the_form_that_is_asked_for(
+    words: tuple[str, ...], form: str, capfd: Capture
+) -> None:
+    code, out, err = call(capfd, "plan", JOB, *words, "--nonsense")
+    assert (code, "No such option" in out + err, "--nonsense" in out + err) == (2, True, True)
+    begins = {"json": "{", "github": "::error", "junit": "<?xml", "sarif": "{"}
+    assert (out + err).startswith(begins[form])
+    if form == "json":
+        told = json.loads(err)
+        assert (told["exit"], told["problems"][0]["hint"]) == (2, "see --help")
+    if form == "sarif":
+        assert json.loads(out + err)["version"] == "2.1.0"
+
+
+def test_behind_two_dashes_words_are_no_options(capfd: Capture) -> None:
+    code, _, err = call(capfd, "plan", "--nonsense", "--", "--errors=json")
+    assert (code, err.startswith("Usage: ")) == (2, True)
+
+
+@pytest.mark.parametrize(("path", "code"), [(JOB, 0), ("nowhere.yaml", 4)])
+def test_a_form_for_programs_keeps_the_exit_code(path: str, code: int, capfd: Capture) -> None:
+    assert call(capfd, "plan", path, "--no-output", "-q", "--errors", "json").code == code
+    told = call(capfd, "payload", "--errors", "json", "--help")
+    assert (told.code, "Exit codes: 0 found" in told.out) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("option", "key"),
+    [
+        ("--limits", "velocity"),
+        *((f"--{key}", key) for key in ("velocity", "acceleration", "jerk", "effort")),
+    ],
+)
+def test_a_limit_as_an_option_is_a_value_to_set(option: str, key: str, capfd: Capture) -> None:
+    code, _, err = call(capfd, "plan", JOB, option, "5")
+    said = " ".join(err.split())
+    assert code == 2
+    assert f"No such option: {option}" in said
+    assert f"--set limits.{key}=NUMBER changes one" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (("check", "rows.csv", "-j", JOB), "say --job, or --json"),
+        (("plan", JOB, "--json"), "rows are JSON with --format jsonl"),
+    ],
+)
+def test_an_option_of_another_command_is_explained(
+    words: tuple[str, ...], meant: str, capfd: Capture
+) -> None:
+    code, _, err = call(capfd, *words)
+    assert (code, meant in " ".join(err.split())) == (2, True)
+
+
+def test_a_value_that_is_missing_is_no_option_that_is_missing(capfd: Capture) -> None:
+    code, _, err = call(capfd, "sweep", JOB, "-j")
+    assert (code, "requires an argument" in err, "say --job" in err) == (2, True, False)
+
+
+def test_help_says_arguments_by_their_names_and_defaults_as_they_are_typed(capfd: Capture) -> None:
+    text = call(capfd, "check", "--help").out
+    assert "0.001 rad or m]" in text
+    assert "[default: (" not in text
+    assert "Example: trajcli check rows.csv --job" in text
+    assert "[OPTIONS] JOB [JOB]..." in call(capfd, "plan", "--help").out.splitlines()[0]
+    assert "<list[str]>" not in text
+    every = call(capfd, "--help").out
+    assert "\n  check    Judge anybody's trajectory for all t\n" in every
+
+
+@pytest.mark.parametrize(
+    ("words", "value", "said"),
+    [
+        (("explain", JOB, "--move", "x"), "x", "'--move': 'x': "),
+        (("view", JOB, "--meshes", "-1"), "-1", "'--meshes': '-1': "),
+        (("plan", JOB, "--digits", "all"), "all", "'all' is not one of 'fixed', 'full'"),
+    ],
+)
+def test_a_wrong_value_is_named_once(words: tuple[str, ...], value: str, said: str, capfd: Capture) -> None:
+    code, _, err = call(capfd, *words)
+    assert (code, said in err, err.count(repr(value))) == (2, True, 1)
+
+
+def test_a_command_with_other_values_is_another_one() -> None:
+    one = PayloadCommand(job="a.yaml", at=1)
+    two = one.replaced(at=2, job="b.yaml")
+    assert isinstance(two, CommandLine)
+    assert (one.at, one.job, two.at, two.job, two.as_json) == (1, "a.yaml", 2, "b.yaml", False)
+
+
+def test_the_application_is_made_when_it_is_asked_for_and_nothing_else_is_there() -> None:
+    from trajcli.cli import app
+
+    assert app.app is app.app
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        app.nothing  # noqa: B018
