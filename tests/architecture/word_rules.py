@@ -272,7 +272,7 @@ RULES = [
         proofs_say_what_their_arrays_are,
         [
             Planted(
-                {"checks/verify.py": "upper_bound = 1\n", "cli/app.py": "rest = 1\n"},
+                {"checks/verify.py": "upper_bound = 1\n", "cli/other.py": "rest = 1\n"},
                 {
                     "checks/verify.py": "for most in range(2):\n    x.most = most\n",
                     "judge/ends.py": "def _room(rest):\n    return rest\n",
