@@ -90,6 +90,10 @@ def test_values_have_the_fewest_digits(text: str, values: str) -> None:
     assert parse_axis(f"a.b={text}").values == tuple(values.split())
 
 
+def test_names_with_points_are_no_ranges() -> None:
+    assert parse_axis("a=../b.csv,1s..x,'1 s..2 s'").values == ("../b.csv", "1s..x", "1 s..2 s")
+
+
 def test_values_are_yaml() -> None:
     axis = parse_axis('a=[400, 1.0, 3],{x: 1},0.2 m/s,"1","[x"')
     assert axis.values == ("[400, 1, 3]", "{x: 1}", "0.2 m/s", '"1"', '"[x"')
@@ -111,6 +115,10 @@ def test_values_are_yaml() -> None:
         ("a=-1.8e308..1:3", "-1.8e308 is no number"),
         ("a=0..1e-999999999:3", "1e-999999999 is no number"),
         ("a=[1", "is never closed"),
+        *(
+            (f"a={text}", "the ends of a range are numbers in the units of the job")
+            for text in ("100 mm/s..0.3 m/s:3", "1..3 s:3", "-1.5 rev .. 2e-1 rev", "1 s..3:3")
+        ),
     ],
 )
 def test_what_says_no_values_is_refused(text: str, message: str) -> None:

@@ -42,6 +42,7 @@ MOST_ROWS = 1_000_000
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _LARGEST_EXPONENT = 308  # of a normal float64, by tens
 _RANGE = re.compile(rf"\s*({_NUMBER}?)\.\.({_NUMBER})(?::(.*))?")
+_QUANTITIES = re.compile(rf"\s*{_NUMBER}[^,'\"\[{{]*\.\.\s*{_NUMBER}[^,]*")
 _VERDICTS: dict[int, PointVerdict] = {1: "exceeded", 3: "unreachable"}
 _NAMED = ("points", "frames", "tools", "sequences")
 """Sections whose keys are names: a new one changes nothing, as nothing names it."""
@@ -77,6 +78,9 @@ def parse_axis(text: str) -> Axis:
     found = _RANGE.fullmatch(values)
     if found is not None:
         return Axis(path.strip(), tuple(map(number_text, _spread(text, *found.groups()))))
+    if _QUANTITIES.fullmatch(values):
+        message = f"--vary {text}: the ends of a range are numbers in the units of the job"
+        raise InputError(message, hint="such as 100..300:9; only a list has units: 0.1 m/s,0.2 m/s")
     listed = parse_document(f"[{values}]", f"--vary {text}", any_root=True).plain()
     if not listed or not isinstance(listed, list):
         hint = "such as --vary limits.tcp.speed=100..500:9 or --vary moves.0.planner=cubic,quintic"
