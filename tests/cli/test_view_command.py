@@ -305,6 +305,10 @@ def test_rows_stay_and_a_dash_is_no_file(folder: Path, capfd: pytest.CaptureFixt
     done = call(capfd, "view", "rows.html", "-o", "./rows.html")
     assert (done.code, "would overwrite the rows of rows.html" in done.err) == (2, True)
     assert (folder / "rows.html").read_text() == CSV
+    (folder / "arm.html").write_text(TWO)
+    done = call(capfd, "view", "rows.csv", "-r", "arm.html", "-o", "arm.html")
+    assert (done.code, "would overwrite the arm of arm.html" in done.err) == (2, True)
+    assert (folder / "arm.html").read_text() == TWO
     piped = call(capfd, "view", "-", "-o", "-", stdin=CSV)
     assert (piped.code, piped.out[:9]) == (0, "<!doctype")
     assert piped.err.startswith(f"stdin: not judged, 3 rows · 1 s, {len(piped.out.encode()) / 1e6:.2f} MB")

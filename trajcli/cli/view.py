@@ -119,7 +119,8 @@ def _shown_file(
     from trajcli.output.delivery.delivered import judged_by, judged_file
     from trajcli.player.recorded import scene_of_file
 
-    _check_inputs_stay(output, [("the rows of", name)])
+    arm = [("the arm of", by)] if isinstance(by, str) else []
+    _check_inputs_stay(output, [("the rows of", name), *arm])
     opened = ByteSource(name)
     if by is None or isinstance(by, str):
         checked = None if by is None else judged_by(opened, by)
