@@ -117,3 +117,9 @@ def test_one_letter_means_one_thing(command, capfd):
 @pytest.mark.parametrize("command", ["plan", "resample", "batch"])
 def test_where_the_json_of_rows_is(command, capfd):
     assert "--format jsonl, the report of `plan` with --report FILE" in call(capfd, command, "--json").err
+
+
+def test_standard_input_is_one_file(capfd: pytest.CaptureFixture[str]) -> None:
+    done = call(capfd, "diff", "-", "-", stdin="t,q1\n0,1\n")
+    assert done.code == 2
+    assert done.err.startswith("error: only one of the files can be standard input")
