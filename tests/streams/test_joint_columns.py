@@ -83,8 +83,8 @@ def test_names_of_the_tool_of_times_and_of_moves_are_joints_only_where_nothing_e
         ("q1,q2,turn", "turn and q1 are columns of the same joint", "leave one out", 7),
         ("t,x", "pair has 2 joints, and there is no column q1, q2", "q1_deg or q1_mm", 1),
         ("t,q0,q1,q2", "q0: joints are counted from 1", "`trajcli convert FILE --si`", 3),
-        ("t,q1,q2,qd0_deg", "qd0_deg: joints are counted from 1", "`trajcli convert FILE --si`", 9),
-        ("tau0,q1,q2", "tau0: joints are counted from 1", "`trajcli convert FILE --si`", 1),
+        ("t,q1,q2,qd0_deg", "qd0_deg: joints are counted from 1", "rename them", 9),
+        ("tau0,q1,q2", "tau0: joints are counted from 1", "rename them", 1),
     ],
 )
 def test_wrong_columns_are_refused_where_they_stand(names: str, message: str, hint: str, column: int) -> None:
@@ -113,3 +113,21 @@ def test_values_that_stand_so_in_the_rows_are_not_copied() -> None:
         assert joint_columns(PAIR, names, "rows.csv").values(rows).base is not rows
     four = joint_columns(robot("a", "b", "c", "d"), ["q1", "q3", "q2", "q4"], "rows.csv")
     assert four.values(np.array([[1.0, 3.0, 2.0, 4.0]])).tolist() == [[1, 2, 3, 4]]
+
+
+@pytest.mark.parametrize(
+    ("names", "helps"),
+    [
+        ("time,a_pos,b_pos", True),
+        ("a_pos,b_pos", False),  # rows without times are not converted
+        ("t,x,y,z", False),
+        ("t,q1", False),  # of one joint, whatever it is called
+        ("t,a_pos", False),
+        ("t,q0,q1", True),
+        ("q0,q1", False),
+    ],
+)
+def test_convert_is_advised_where_it_helps(names: str, helps: bool) -> None:
+    with pytest.raises(InputError) as caught:
+        joint_columns(PAIR, names.split(","), "rows.csv")
+    assert ("`trajcli convert FILE --si`" in str(caught.value.problems[0].hint)) == helps

@@ -105,13 +105,10 @@ def run_convert(options: ConvertCommand) -> int:
     """
     from trajcli.queries.arm import files_of_arm
 
-    if options.robot is None:
-        _check_output([options.file], options)
-        motion = _read(options.file, options, si=options.si)
-    else:
-        _refuse_two_inputs([options.file, options.robot])
-        _check_output([options.file], options, files_of_arm(options.robot))
-        motion = _of_robot(options.file, options.robot, options, si=options.si)
+    arm = [] if options.robot is None else [options.robot]
+    _refuse_two_inputs([options.file, *arm])
+    _check_output([options.file], options, (file for name in arm for file in files_of_arm(name)))
+    motion = _read(options.file, options, options.robot, si=options.si)
     if options.si:
         motion = replace(motion, columns=plain_columns(motion))
     _write(motion, options)
@@ -185,24 +182,20 @@ def _edited(
     return 0
 
 
-def _read(source: str, options: EditCommand, *, si: bool = False) -> EditedMotion:
-    """Return the motion of a file, whose units do not matter where its columns stay."""
-    units = None if si or format_of(options.output, options.form).si else Units()
-    return read_motion(source, options.part(ReadingOptions), declared=units)
+def _read(source: str, options: EditCommand, robot: str | None = None, *, si: bool = False) -> EditedMotion:
+    """Return the motion of a file, in the order, with the names and in the units of a robot's joints."""
+    arm, units = None, None
+    if robot is not None:
+        from trajcli.queries.arm import open_sheet, stated_units
 
-
-def _of_robot(source: str, robot: str, options: EditCommand, *, si: bool) -> EditedMotion:
-    """Return the motion of a file in the order, with the names and in the units of a robot's joints."""
-    from trajcli.queries.arm import open_sheet, stated_units
-
-    arm, units = open_sheet(robot).robot, stated_units(robot)
+        arm, units = open_sheet(robot).robot, stated_units(robot)
     if units is None and not si and not format_of(options.output, options.form).si:
-        units = Units()  # which do not matter
+        units = Units()  # which do not matter where columns stay
     return read_motion(
         source,
         options.part(ReadingOptions),
-        joints=arm.joint_names,
-        joint_types=arm.joint_types,
+        joints=None if arm is None else arm.joint_names,
+        joint_types=None if arm is None else arm.joint_types,
         declared=units,
     )
 

@@ -29,7 +29,7 @@ from trajcli.player.scene import (
 from trajcli.queries.arm import open_sheet
 from trajcli.queries.forward import refuse_far
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.joint_columns import CONVERTED, JointColumns, joint_columns, refuse_zero
+from trajcli.streams.joint_columns import JointColumns, converted, joint_columns, refuse_zero
 from trajcli.streams.reading import read_table
 from trajcli.streams.table import Table
 from trajcli.trajectory import Trajectory
@@ -143,7 +143,7 @@ def _times(table: Table) -> Array:
     if "t" not in table.names:
         raise InputError(
             f"{table.file} has no column 't'",
-            hint=f"its columns are {', '.join(table.names[:12])}; {CONVERTED}",
+            hint=f"its columns are {', '.join(table.names[:12])}{converted(table.names, table.file)}",
         )
     times = table.column("t")
     wrong = np.flatnonzero(np.diff(times) <= 0)
@@ -183,7 +183,7 @@ def _joint_count(table: Table, columns: Sequence[Column]) -> int:
         listed = ", ".join(column.name for column in found) or "none"
         raise InputError(
             f"{table.file} has the joint columns {listed}, expected q1, q2, ...",
-            hint=f"its columns are {', '.join(table.names[:12])}; {CONVERTED}",
+            hint=f"its columns are {', '.join(table.names[:12])}{converted(table.names, table.file)}",
         )
     return len(found)
 

@@ -18,7 +18,7 @@ from trajcli.limits.kinds import JOINT_KINDS, SPEED_KINDS
 from trajcli.plots.choice import JOINT_QUANTITIES
 from trajcli.plots.display_units import DisplayUnits
 from trajcli.plots.panel import NO_POINTS
-from trajcli.streams.joint_columns import CONVERTED, refuse_zero
+from trajcli.streams.joint_columns import converted, refuse_zero
 from trajcli.streams.table import Table
 from trajcli.trajectory import Trajectory
 
@@ -38,7 +38,7 @@ def columns_of_table(table: Table) -> tuple[Column, ...]:
     refuse_zero(table.names, table.file)
     columns = tuple(map(parse_column, table.names))
     if not any(column.kind == "t" and column.joint is None for column in columns):
-        hint = f"it has {', '.join(table.names[:12])}; {CONVERTED}"
+        hint = f"it has {', '.join(table.names[:12])}{converted(table.names, table.file)}"
         raise InputError(f"{table.file} has no column t, over which it could be plotted", hint=hint)
     return columns
 

@@ -18,9 +18,6 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
 from trajcli.kinematics.robot import Robot
 
-CONVERTED = "`trajcli convert FILE --si` calls columns of any file so"
-"""The advice for a file in other names."""
-
 _FROM_ZERO = re.compile(r"(?:qd{0,3}|tau)0(?:_deg|_mm)?")
 _NO_JOINTS = ("t", "move")  # whatever joints are called
 
@@ -68,7 +65,8 @@ def joint_columns(robot: Robot, names: Sequence[str], file: str, kind: str = "q"
     missing = [f"{kind}{i + 1}" for i in range(len(robot.joints)) if i not in by_joint]
     if missing:
         message = f"{robot.name} has {len(robot.joints)} joints, and there is no column {', '.join(missing)}"
-        hint = f"columns are called {kind}1 in SI, {kind}1_deg or {kind}1_mm otherwise; {CONVERTED}"
+        hint = f"columns are called {kind}1 in SI, {kind}1_deg or {kind}1_mm otherwise"
+        hint += converted(names, file, len(robot.joints))
         raise InputError(Problem(message, hint, Place(file, 1, 1, ",".join(names))))
     columns = [by_joint[i] for i in range(len(robot.joints))]
     indices = np.array([index for index, _ in columns])
@@ -93,7 +91,25 @@ def refuse_zero(names: Sequence[str], file: str) -> None:
     for index, name in enumerate(names):
         if _FROM_ZERO.fullmatch(name):
             message = f"{name}: joints are counted from 1, as q1, q2, ..."
-            raise _refused(names, file, index, message, CONVERTED)
+            raise _refused(names, file, index, message, f"rename them{converted(names, file)}")
+
+
+def converted(names: Sequence[str], file: str, joints: int | None = None) -> str:
+    """Return the rest of an advice for a file in other names; empty where `convert` would not help.
+
+    Args:
+        names: Of all columns.
+        file: Its name.
+        joints: How many are needed; any unless given.
+    """
+    from trajcli.streams.recorded.column_roles import NamedFile, assign_roles
+
+    try:
+        roles = assign_roles(NamedFile(file, tuple(names), lambda _: None))
+    except InputError:
+        return ""
+    helps = joints in (None, len(roles.joints["q"]))
+    return "; `trajcli convert FILE --si` calls columns so" if helps else ""
 
 
 def _of_joints(robot: Robot, names: Sequence[str], kind: str) -> Iterator[tuple[int, Column]]:
