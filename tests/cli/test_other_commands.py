@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -126,6 +127,14 @@ def test_init_writes_a_job_that_plans(capfd: Capture) -> None:
     uncommented = re.sub(r"^( *)# (frames|tool|- \{repeat)", r"\1\2", starter, flags=re.M)
     plan = plan_job(job_from_text(uncommented))
     assert (plan.verdict.passed, len(plan.moves)) == (True, 7)
+
+
+def test_what_init_advises_plans_a_file_of_any_name(capfd: Capture) -> None:
+    _, _, err = call(capfd, "init", "my job's.yaml")
+    command = err.removeprefix("my job's.yaml written; now: trajcli ")
+    words = shlex.split(command)
+    assert words[-2:] == [">", "out.csv"]
+    assert call(capfd, *words[:-2], "--rate", "2").code == 0
 
 
 def test_init_does_not_overwrite(capfd: Capture) -> None:

@@ -51,9 +51,10 @@ def _behind_commas(names: Iterable[str], incomplete: str) -> list[str]:
 
 
 def _sources(ctx: typer.Context) -> list[str]:
+    """Return the files that the command line names; what a shell completes has no standard input."""
     given = [ctx.params.get(key) for key in ("job", "sources", "files")]
     named = [name for value in given if value for name in ([value] if isinstance(value, str) else value)]
-    return [*named, *map(str, ctx.args)]
+    return [name for name in (*named, *map(str, ctx.args)) if name != "-"]
 
 
 def _job(ctx: typer.Context) -> Mapping[str, Any]:
@@ -63,7 +64,7 @@ def _job(ctx: typer.Context) -> Mapping[str, Any]:
 
     for name in _sources(ctx):
         try:
-            content = read_document(name).plain() if name != "-" else None
+            content = read_document(name).plain()
         except (TrajcliError, OSError, ValueError):
             continue
         if isinstance(content, dict):

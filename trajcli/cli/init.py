@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from trajcli.errors import InputError
@@ -32,5 +33,5 @@ def run_init(options: InitCommand) -> int:
         raise InputError(f"{file} exists", hint="name another file, or say --force to overwrite it")
     with whole_file(file) as out:
         out.write(text)
-    print(f"{file} written; now: trajcli plan {file} > out.csv", file=sys.stderr)  # noqa: T201
+    print(f"{file} written; now: trajcli plan {quote(file)} > out.csv", file=sys.stderr)  # noqa: T201
     return 0

@@ -6,6 +6,7 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -123,7 +124,7 @@ def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[list[st
         raise InputError("only one of the files can be standard input")
     jobs = [name for name in files if is_job(name)]
     if len(jobs) > 2:
-        hint = f"write the rows of the others, and plot these: trajcli plan {jobs[2]} -o rows.csv"
+        hint = f"write the rows of the others, and plot these: trajcli plan {quote(jobs[2])} -o rows.csv"
         raise InputError(f"two jobs can be plotted, and there are {len(jobs)}", hint=hint)
     if overrides and not jobs:
         raise InputError(

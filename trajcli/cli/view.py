@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from shlex import join
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +35,7 @@ def run_view(options: ViewCommand) -> int:
     """
     _check_output(options.output)
     if len(options.sources) > 2:
-        hint = f"trajcli view {' '.join(options.sources[:2])}"
+        hint = f"trajcli view {join(options.sources[:2])}"
         raise InputError(f"a page shows one motion or two, and {len(options.sources)} are named", hint=hint)
     jobs = [options.robot is None and is_job(name) for name in options.sources]
     if options.override and not any(jobs):
