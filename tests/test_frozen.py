@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import FrozenInstanceError, asdict, dataclass, field, replace
 from functools import cached_property
+from unittest.mock import ANY
 
 import pytest
 
@@ -57,7 +58,14 @@ def test_a_value_is_that_of_the_standard_library(k, values, named):
 
 @pytest.mark.parametrize(
     ("values", "named"),
-    [((), {}), ((1, (), [], "y", 5), {}), ((1,), {"first": 2}), ((1,), {"fifth": 2}), ((), {"second": ()})],
+    [
+        ((), {}),
+        ((1, (), [], "y", 5), {}),
+        ((1, (), [], "y"), {"first": 2}),
+        ((1,), {"first": 2}),
+        ((1,), {"fifth": 2}),
+        ((), {"second": ()}),
+    ],
 )
 @pytest.mark.parametrize("maker", [OURS[1], PEERS[1]])
 def test_what_does_not_fit_is_refused(maker, values, named):
@@ -68,13 +76,43 @@ def test_what_does_not_fit_is_refused(maker, values, named):
 @pytest.mark.parametrize("maker", [OURS[0], PEERS[0]])
 def test_it_cannot_be_changed(maker):
     value = maker(1)
-    with pytest.raises(FrozenInstanceError, match="first"):
+    with pytest.raises(FrozenInstanceError, match="cannot assign to field 'first'"):
         value.first = 2
     with pytest.raises(FrozenInstanceError, match="other"):
         value.other = 2
-    with pytest.raises(FrozenInstanceError, match="first"):
+    with pytest.raises(FrozenInstanceError, match="cannot delete field 'first'"):
         del value.first
     assert value.first == 1
+
+
+@pytest.mark.parametrize("decorator", [frozen, comparable, dataclass(frozen=True)])
+def test_a_value_without_checks_needs_its_fields_and_takes_defaults_that_are_nothing(decorator):
+    @decorator
+    class Bare:
+        """Fields alone."""
+
+        first: int
+        second: int = 0
+        third: str = ""
+
+    assert vars(Bare(0)) == {"first": 0, "second": 0, "third": ""}
+    for named in ({}, {"second": 1}):
+        with pytest.raises(TypeError, match="first"):
+            Bare(**named)
+    assert Bare.__doc__ == "Fields alone."
+
+
+@pytest.mark.parametrize("decorator", [frozen, comparable])
+def test_a_class_that_shows_itself_keeps_its_way(decorator):
+    @decorator
+    class Shown:
+        first: int
+
+        def __repr__(self) -> str:
+            return f"<{self.first}>"
+
+    assert repr(Shown(1)) == "<1>"
+    assert Shown.__doc__ == "Shown"
 
 
 def test_lists_of_defaults_are_not_shared():
@@ -94,6 +132,7 @@ def test_comparable_values_are_equal_where_their_fields_are(makers):
     assert more(1) != maker(1)
     assert maker(1) != type("Same", (maker,), {})(1)
     assert maker(1) != (1, (1, 2), [])
+    assert maker(1) == ANY  # which is asked, too
     assert repr(maker(1)) == "made.<locals>.Value(first=1, second=(1, 2), third=[])"
 
 

@@ -18,6 +18,7 @@ version: 1
 robot: {joints: [{name: turn}, {name: tilt}, {name: lift}]}
 points: {home: {joints: [0, 0, 0]}, far: {joints: [1, 0, 0]}}
 start: home
+limits: {position: [[-1, 1], 2, 3]}
 moves:
   - {planner: quintic, to: far, duration: 2}
   - {planner: hold, duration: 1}
@@ -80,9 +81,31 @@ def test_a_job_whose_robot_is_wrong_offers_its_paths(job: str) -> None:
 def test_paths_are_those_that_are_stated_and_those_that_the_planner_knows(job: str) -> None:
     paths = paths_that_begin(line(job), "")
     assert paths == sorted(set(paths))
-    assert {"version=", "robot.joints.2.name=", "output.times=", "moves.0.to=", "zone="} <= set(paths)
-    assert not {"robot=", "moves=", "output=", "output.times.0=", "points.home="} & set(paths)
-    assert {"limits.tcp.speed=", "limits.scale.velocity=", "units.angle=", "defaults.law.shape="} <= set(paths)
+    assert {
+        "version=",
+        "robot.joints.2.name=",
+        "limits.position.0=",
+        "limits.position.1=",
+        "output.times=",
+        "moves.0.to=",
+        "zone=",
+        "output.rate=",
+    } <= set(paths)
+    assert not {
+        "robot=",
+        "moves=",
+        "output=",
+        "limits.position.0.0=",
+        "output.times.0=",
+        "points.home=",
+    } & set(paths)
+    assert {
+        "limits.tcp.speed=",
+        "limits.scale.velocity=",
+        "units.angle=",
+        "when_over_limit=",
+        "defaults.law.shape=",
+    } <= set(paths)
     of_move = {"moves.0.limits.velocity=", "moves.0.when_over_limit=", "moves.0.limits.tcp.speed="}
     assert of_move <= set(paths)
     assert not [path for path in paths if path.startswith("moves.1.") and "law" in path]

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,13 +21,17 @@ from trajcli.cli.plan import (
     _moves,
     _steps,
     _summarise_consumer,
+    summary,
     violation_lines,
 )
 from trajcli.errors import Amount
 from trajcli.findings import Finding
+from trajcli.job.read import load_job
 from trajcli.job.reports.comparisons import PeerViolation, ReferenceReport
+from trajcli.output.delivery import joined
 from trajcli.peers import move_reference
 from trajcli.planners.planner import PlannedMove
+from trajcli.planning.plan import plan_job
 
 Capture = pytest.CaptureFixture[str]
 
@@ -257,6 +262,39 @@ def test_of_limits_that_a_peer_breaks_the_worst_is_said() -> None:
     (line,) = violation_lines("toppra", faster[1:2])
     assert line == "  toppra breaks a limit: the jerk of b reaches 500 u, its limit is 250"
     assert list(violation_lines("toppra", ())) == []
+
+
+def test_limits_that_a_peer_breaks_are_said_in_the_units_of_the_job(
+    capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    true = move_reference.reference_of
+    broken = PeerViolation(
+        quantity="velocity", joint="j1", value=math.pi, limit=math.pi / 2, time=0.5, unit="rad/s"
+    )
+    monkeypatch.setattr(
+        "trajcli.peers.move_reference.reference_of",
+        lambda move: true(move).model_copy(update={"violations": [broken]}),
+    )
+    err = call(capfd, "plan", "job.yaml", "--no-output", "--reference").err
+    assert "  ruckig breaks a limit: the velocity of j1 reaches 180 deg/s, its limit is 90\n" in err
+
+
+@pytest.mark.parametrize(("words", "digits"), [((), "fixed"), (("--digits", "full"), "full")])
+def test_rows_are_judged_with_the_digits_with_which_they_are_written(
+    words: tuple[str, ...], digits: str, capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged: list[Any] = []
+    true = joined.joined_rows
+    monkeypatch.setattr(joined, "joined_rows", lambda *given: judged.append(given[3]) or true(*given))
+    assert call(capfd, "plan", "job.yaml", *words).code == 0
+    assert judged == [digits]
+
+
+def test_all_that_is_judged_on_samples_is_named(job: Path) -> None:
+    plan = plan_job(load_job(job))
+    sampled = (("branch", (0,)), ("distance to a singularity", (0, 2)))
+    text = summary(replace(plan, verdict=replace(plan.verdict, sampled=sampled)), 0)
+    assert "  on samples only: branch, move 0; distance to a singularity, moves 0, 2" in text.splitlines()
 
 
 def stepping(*steps: tuple[str, float, float]) -> SimpleNamespace:

@@ -315,6 +315,37 @@ def test_rows_stay_and_a_dash_is_no_file(folder: Path, capfd: pytest.CaptureFixt
     assert not (folder / "-").exists()
 
 
+URDF = (
+    '<robot name="arm"><link name="base"><visual><geometry><box size="1 1 1"/></geometry></visual></link>'
+    '<link name="tip"/><joint name="j1" type="revolute"><parent link="base"/><child link="tip"/>'
+    '<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="9" velocity="9"/></joint></robot>'
+)
+LINKS = JOB.replace("{joints: [{velocity: 90}]}", "{urdf: arm.urdf}")
+BOX = "  meshes of the URDF: 12 triangles"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("links.yaml",), [BOX]),
+        (("links.yaml", "--meshes", "0"), []),
+        (("turn.csv", "-r", "arm.urdf"), [BOX]),
+        (("turn.csv", "-r", "arm.urdf", "--meshes", "0"), []),
+        (("job.yaml", "links.yaml"), [BOX]),
+        (("links.yaml", "job.yaml"), [BOX]),
+        (("links.yaml", "turn.csv"), [BOX]),
+    ],
+)
+def test_links_are_drawn_as_long_as_it_is_asked_for_and_of_either_motion(
+    words: tuple[str, ...], said: list[str], folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "arm.urdf").write_text(URDF)
+    (folder / "links.yaml").write_text(LINKS)
+    (folder / "turn.csv").write_text("t,q1_deg,qd1_deg\n0,0,0\n1,30,0\n")
+    done = call(capfd, "view", *words, "-o", "view.html")
+    assert (done.code, [line for line in done.err.splitlines() if "meshes" in line]) == (0, said)
+
+
 def test_a_terminal_gets_a_hint_and_no_page(folder: Path) -> None:
     leader, follower = pty.openpty()
     try:

@@ -65,7 +65,8 @@ def test_a_picture_of_nothing_is_refused() -> None:
 def test_marks_and_names_of_a_file_over_two_plans_are_those_of_the_file() -> None:
     """The plan that is drawn as a file is drawn is not judged as one."""
     first, second = plan_of(CUBIC), plan_of(move("cubic", [0.2, 0.1]))
-    found = Judgement((Finding("velocity", joint="j1", value=10.0, limit=9.0, time=0.5),), "linear", 3)
+    error = Finding("velocity", joint="j1", value=10.0, limit=9.0, time=0.5)
+    found = Judgement((error, Finding("time", severity="warning")), "linear", 3)
     picture = picture_of(
         first, [table("a/rows.csv", "q1,q2,qd1,qd2")], ["qd"], judgements=[found], second=second
     )
@@ -76,11 +77,21 @@ def test_marks_and_names_of_a_file_over_two_plans_are_those_of_the_file() -> Non
     assert [trace.source for trace in panel.traces] == [0, 1, 2]
 
 
+def test_the_title_counts_what_has_to_be_changed() -> None:
+    """A move that is too short for two limits is to be longer, once; two such moves are two."""
+    robot = "joints: [{velocity: 9, acceleration: 9}, {velocity: 9, acceleration: 9}]"
+    short, back = (move("cubic", [q, 0], "duration: 0.125") for q in (1, 0))
+    one, two = plan_of(short, robot=robot), plan_of(short, back, robot=robot)
+    assert len(one.verdict.findings) > 1
+    assert picture_of(one).title == "job: NOT VERIFIED, 1 finding, 0.125 s"
+    assert picture_of(two).title == "job: NOT VERIFIED, 2 findings, 0.25 s"
+
+
 @pytest.mark.parametrize(
     ("header", "has"), [("q1,q2", "it has columns for q"), ("move", "it has columns for none")]
 )
 def test_a_file_that_has_nothing_of_what_is_drawn_says_what_it_has(header: str, has: str) -> None:
-    with pytest.raises(InputError, match="a.csv has no columns for qd, qdd") as refused:
+    with pytest.raises(InputError, match=r"a\.csv has no columns for qd, qdd") as refused:
         picture_of(plan_of(CUBIC), [table("a.csv", header)], ["qd", "qdd"])
     assert refused.value.problems[0].hint == has
 
@@ -145,7 +156,11 @@ def test_jerks_are_drawn_where_one_move_limits_them() -> None:
     ("link", "moves", "has"),
     [
         (LINK, (CUBIC,), False),
-        (LINK.replace("mass: 1", "mass: 2").replace("velocity: 9", "velocity: 9, effort: 999"), (CUBIC,), True),
+        (
+            LINK.replace("mass: 1", "mass: 2").replace("velocity: 9", "velocity: 9, effort: 999"),
+            (CUBIC,),
+            True,
+        ),
         (LINK, ("attach: {mass: 1}", CUBIC, "detach: {}", BACK), True),
     ],
 )
@@ -158,7 +173,10 @@ def test_efforts_are_drawn_where_one_is_limited_or_something_is_carried(
 
 def test_efforts_are_drawn_where_a_file_has_them() -> None:
     plan = plan_of(CUBIC, robot=f"convention: standard, joints: [{LINK}, {LINK}]")
-    assert [TAU in shown(picture_of(plan, [table("a.csv", names)])) for names in ("q1,tau2", "q1,q2")] == [True, False]
+    assert [TAU in shown(picture_of(plan, [table("a.csv", names)])) for names in ("q1,tau2", "q1,q2")] == [
+        True,
+        False,
+    ]
 
 
 FLY = "planner: jerk_limited, synchronize: phase, to: {joints: [%s]}"
@@ -170,7 +188,11 @@ FLY = "planner: jerk_limited, synchronize: phase, to: {joints: [%s]}"
         ((CUBIC,), "", set()),
         ((CUBIC, move("cubic", [0, 0], "duration: 1, limits: {tcp: {speed: 9}}")), "", {"speed"}),
         ((CUBIC,), "limits: {tcp: {angular_speed: 9}}\n", {"speed"}),
-        ((CUBIC, "planner: line, to: {xyz: [0.7, 0.2, 0]}, law: {shape: quintic, duration: 2}"), "", {"speed", "path"}),
+        (
+            (CUBIC, "planner: line, to: {xyz: [0.7, 0.2, 0]}, law: {shape: quintic, duration: 2}"),
+            "",
+            {"speed", "path"},
+        ),
         ((FLY % "0.2, 0.1", FLY % "0.1, 0.9"), "zone: {joints: 0.05}\n", {"speed", "path"}),
     ],
 )

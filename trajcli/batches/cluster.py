@@ -70,7 +70,7 @@ def _client(address: str | None) -> tuple[Any, Any]:
         connect: Any = distributed.Client
         return connect(address, timeout=_CONNECTING, set_as_default=False), distributed.as_completed
     except (OSError, ValueError, TypeError) as error:
-        message = f"the scheduler {address} cannot be reached: {error or type(error).__name__}"
+        message = f"the scheduler {address} cannot be reached: {str(error) or type(error).__name__}"
         raise FileError(message, hint="`dask scheduler` prints its address") from None
 
 

@@ -6,6 +6,7 @@ Functions of typer; whatever is wrong with the job, they offer what is known wit
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
 import typer
@@ -29,10 +30,8 @@ def joints_that_begin(ctx: typer.Context, incomplete: str) -> list[str]:
     from trajcli.job.read import load_job
 
     for name in _sources(ctx):
-        try:
+        with suppress(TrajcliError, OSError, ValueError):
             return _behind_commas(load_job(name).robot.joint_names, incomplete)
-        except (TrajcliError, OSError, ValueError):
-            continue
     return []
 
 
@@ -63,11 +62,8 @@ def _job(ctx: typer.Context) -> Mapping[str, Any]:
     from trajcli.job.yaml.load import read_document
 
     for name in _sources(ctx):
-        try:
-            content = read_document(name).plain()
-        except (TrajcliError, OSError, ValueError):
-            continue
-        if isinstance(content, dict):
+        with suppress(TrajcliError, OSError, ValueError):
+            content: dict[str, Any] = read_document(name).plain()
             return content
     return {}
 
