@@ -141,3 +141,36 @@ def test_people_read_words_and_the_reasons_behind_all_of_them(
     words = {" ".join(line.split()) for line in out.splitlines()}
     assert words == {"\x1b[1;32mwritten \x1b[0m good.yaml 1 s", "\x1b[1;31mfailed \x1b[0m fast.yaml"}
     assert err.startswith("fast.yaml: failed: move 0 (quintic): the velocity of j1 reaches 225 deg/s")
+
+
+@pytest.mark.parametrize(
+    ("jobs", "words", "count", "timeout"),
+    [
+        (2, (), 2, 600),
+        (5, (), 3, 600),
+        (5, ("-j", "4"), 4, 600),
+        (5, ("-j", "1", "--timeout", "7.5"), 1, 7.5),
+        (1, ("-j", "9", "--timeout", "0"), 1, None),
+    ],
+)
+def test_as_many_processes_work_as_there_are_jobs_cores_or_as_are_named(
+    jobs: int,
+    words: tuple[str, ...],
+    count: int,
+    timeout: float | None,
+    capfd: Capture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a machine of three cores."""
+    begun: list[tuple[int, int, float | None]] = []
+
+    def run_in_processes(tasks: Any, setup: Any, count: int, timeout: float | None, on_tick: Any) -> Any:
+        begun.append((len(tasks), count, timeout))
+        on_tick()
+        yield from ()
+
+    monkeypatch.setattr("trajcli.batches.processes.usable_cores", lambda: 3)
+    monkeypatch.setattr("trajcli.batches.processes.run_in_processes", run_in_processes)
+    write(**{f"job{k}": JOB for k in range(jobs)})
+    assert call(capfd, "batch", ".", *words).code == 0
+    assert begun == [(jobs, count, timeout)]

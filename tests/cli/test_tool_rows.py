@@ -66,3 +66,15 @@ def test_diff_interpolates_them_by_their_derivatives(
     assert found.code == 0, found.out + found.err
     without = call(capfd, "diff", fine, coarse, "--resample", "--atol", "1,ax=1e-5")
     assert without.code == 1
+
+
+@pytest.mark.parametrize(("off", "told"), [(0.9e-6, False), (1.1e-6, True), (-1.1e-6, True)])
+def test_rows_of_another_tool_are_told_from_rounded_ones(
+    off: float, told: bool, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """An arm of 0.3 m and 0.2 m stands stretched along x, and the rows say so or a micrometre beside."""
+    rows = f"q1,q2,x,y,z,qw,qx,qy,qz\n0,0,0.5,0,0,1,0,0,0\n0,0,0.5,{off:.9f},0,1,0,0,0\n"
+    done = call(capfd, "fk", "--robot", "planar2r", "-", stdin=rows)
+    assert done.code == 0
+    assert (f"up to {abs(off):.6g} m from that of Planar 2R" in done.err) == told
+    assert "tcp" not in call(capfd, "fk", "--robot", "planar2r", "--frame", "base", "-", stdin=rows).err

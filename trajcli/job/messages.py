@@ -25,7 +25,6 @@ from trajcli.suggest import abridged, did_you_mean, valid_names
 M = TypeVar("M", bound=BaseModel)
 _NOTED = 1e-12  # a smaller defect of a rotation matrix is rounding
 _KINDS = {
-    "bool_parsing": "true or false",
     "bool_type": "true or false",
     "dict_type": "a mapping",
     "int_type": "a whole number",

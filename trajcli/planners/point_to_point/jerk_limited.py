@@ -62,8 +62,9 @@ class JerkLimited(PointToPoint):
     brake: Annotated[
         bool,
         Field(
+            strict=True,
             description="Whether a start outside the velocity or acceleration limits is accepted, and "
-            "brought inside first, as fast as possible."
+            "brought inside first, as fast as possible.",
         ),
     ] = False
 

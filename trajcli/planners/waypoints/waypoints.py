@@ -92,8 +92,9 @@ class FastestThroughPoints(PointSequence):
     straight: Annotated[
         bool,
         Field(
+            strict=True,
             description="Whether it keeps to the polyline: through collinear points without a stop, with a "
-            "stop where it turns."
+            "stop where it turns.",
         ),
     ] = False
 
