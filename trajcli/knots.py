@@ -81,6 +81,7 @@ class Knots:
         position: Shape (m, n), rad or m.
         velocity: Shape (m, n), per second; in the end exactly zero where the trajectory ends at rest.
         acceleration: Shape (m, n), per second squared; where it steps, that after the step.
+            Of rows that state none shape (m, 0); velocities likewise.
         deviation: Of quintics between the knots.
     """
 

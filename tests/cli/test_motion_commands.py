@@ -187,14 +187,15 @@ def test_what_a_message_leaves_out_is_said(capfd: Capture) -> None:
     assert (refused.code, "1 joint (q1), expected 2" in refused.err) == (2, True)
 
 
-def test_positions_alone_become_a_log_with_a_remark(capfd: Capture) -> None:
+def test_positions_alone_are_judged_alike_in_a_log(capfd: Capture) -> None:
+    Path("arm.yaml").write_text("units: {angle: deg}\njoints: [{name: j1, velocity: 10, jerk: 5}]\n")
     Path("log.csv").write_text("t,q1_deg\n0,0\n1,10\n2,0\n")
-    code, _, err = call(capfd, "convert", "log.csv", "-o", "log.mcap")
-    assert code == 0
-    assert "no column qd: it is of the curve through the rows" in err
-    velocities = open_motion("log.mcap").whole().qd
-    assert velocities is not None
-    np.testing.assert_allclose(np.rad2deg(velocities[:, 0]), [10, -10, -10])
+    assert call(capfd, "convert", "log.csv", "-o", "log.mcap").code == 0
+    assert call(capfd, "retime", "log.csv", "--robot", "arm.yaml", "-o", "slow.mcap").code == 0
+    for name in ("log.csv", "log.mcap", "slow.mcap"):
+        told = call(capfd, "check", name, "--robot", "arm.yaml", "--format", "json")
+        found = json.loads(told.out)
+        assert (found["verdict"], found["interpolation"]) == ("satisfied", "linear")
 
 
 @pytest.mark.parametrize("start", [0, 12, 1_700_000_000])

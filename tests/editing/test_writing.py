@@ -118,17 +118,40 @@ def test_a_reader_is_foretold_the_rounding_of_decimals_alone(tmp_path: Path, end
     assert (np.abs(found - third.rows.q).max() > 1e-12) == (ending == "csv")
 
 
-def test_what_a_log_needs_and_rows_lack_is_of_the_curve_through_them(tmp_path: Path) -> None:
-    """Straight lines from t = 5 s on: the velocity of the line that follows, no acceleration; a note about each."""
-    motion = read(tmp_path / "rows.csv", "t,q1\n5,0\n6,2\n8,0\n")
-    notes = write_motion(motion, str(tmp_path / "out.mcap"))
-    found = read_motion(str(tmp_path / "out.mcap"), ReadingOptions()).rows
-    assert found.t.tolist() == [5, 6, 8]
-    assert found.qd is not None
-    assert found.qdd is not None
-    assert found.qd[:, 0].tolist() == [2, -1, -1]
-    assert found.qdd[:, 0].tolist() == [0, 0, 0]
-    assert [note.partition(":")[0] for note in notes] == ["no column qd", "no column qdd"]
+@pytest.mark.parametrize("given", ["q", "q qd", "q qdd", "q qd qdd", "q tau", "q qd tau"])
+def test_a_log_states_what_the_columns_state(tmp_path: Path, given: str) -> None:
+    """As mcap_ros2 reads it: empty arrays where there is no column, and no topic of accelerations without any."""
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    names, ts = given.split(), [5.0, 6.0, 8.0]
+    said = {name: [[k + j / 4 + 8 * n for j in range(2)] for k in range(3)] for n, name in enumerate(names)}
+    rows = [[t, *(value for name in names for value in said[name][k])] for k, t in enumerate(ts)]
+    head = ",".join(["t", *(f"{name}{j}" for name in names for j in (1, 2))])
+    text = "\n".join([head, *(",".join(map(str, row)) for row in rows)])
+    motion, path = read(tmp_path / "rows.csv", text + "\n"), tmp_path / "out.mcap"
+    assert write_motion(motion, str(path)) == ()
+    with path.open("rb") as stream:
+        messages = [
+            (channel.topic, m)
+            for _, channel, _, m in make_reader(
+                stream, decoder_factories=[DecoderFactory()]
+            ).iter_decoded_messages()
+        ]
+    nothing: list[list[float]] = [[]] * 3
+
+    def held(states: list[object], **kinds: str) -> None:
+        for field, kind in kinds.items():
+            assert [list(getattr(m, field)) for m in states] == said.get(kind, nothing), field
+
+    topics = {topic: [m for name, m in messages if name == topic] for topic, _ in messages}
+    held(topics["/joint_states"], position="q", velocity="qd", effort="tau")
+    held(topics["/joint_trajectory"][0].points, positions="q", velocities="qd", accelerations="qdd")
+    assert ("/joint_accelerations" in topics) == ("qdd" in names)
+    if "qdd" in names:
+        held(topics["/joint_accelerations"], position="qdd", velocity="", effort="")
+    found = read_motion(str(path), ReadingOptions())
+    assert {name: values.tolist() for name, values in found.quantities.items()} == said
 
 
 @pytest.mark.parametrize(

@@ -143,6 +143,13 @@ def test_every_state_of_a_log_is_read_back() -> None:
                     verify_mcap(out, in_blocks(other, *sizes), columns, recording)
 
 
+def test_a_log_of_other_columns_does_not_agree() -> None:
+    rows, columns, recording, out = log()
+    without = [k for k, column in enumerate(columns) if column.kind != "tau"]
+    with pytest.raises(TrajcliError, match="read back has 6 of 0 columns tau"):
+        verify_mcap(out, in_blocks(rows[:, without]), [columns[k] for k in without], recording)
+
+
 def test_a_log_holds_as_many_states_as_rows_of_its_clock_with_its_metadata() -> None:
     rows, columns, recording, out = log()
     for other in (rows[:-1], rows[1:], rows[:1], np.vstack([rows, rows[-1:]])):

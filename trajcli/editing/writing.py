@@ -139,9 +139,9 @@ def _cells(motion: EditedMotion, column: WrittenColumn, part: slice) -> Array:
 
 
 def _si_columns(motion: EditedMotion, form: StreamFormat) -> tuple[Column, ...]:
-    """Return the columns of a format in SI: those there are; a log has q, qd and qdd, and no qddd."""
-    count, log = motion.rows.q.shape[1], form.content == "log"
-    names = list(ORDERS[:3]) if log else [name for name in ORDERS if name in motion.quantities]
+    """Return the columns of a format in SI: those there are; a log has no qddd."""
+    count, orders = motion.rows.q.shape[1], 3 if form.content == "log" else 4
+    names = [name for name in ORDERS[:orders] if name in motion.quantities]
     found = [Column("t", quantity=Quantity("time"))]
     for name in names:
         angle = Quantity("angle", JOINT_ORDERS[name])
@@ -154,40 +154,26 @@ def _si_columns(motion: EditedMotion, form: StreamFormat) -> tuple[Column, ...]:
 
 
 def _si_rows(motion: EditedMotion, columns: tuple[Column, ...]) -> Iterator[Array]:
-    rows, states = motion.rows, _states(motion)
+    rows = motion.rows
     for low in range(0, rows.t.size, ROWS):
         part = slice(low, low + ROWS)
         cells = [rows.t[part, None]]
         for name in dict.fromkeys(column.kind for column in columns):
             if name in JOINT_GROUPS:
-                cells.append(motion.quantities.get(name, states.get(name, rows.q))[part])
+                cells.append(motion.quantities[name][part])
             elif name == "move" and rows.move is not None:
                 cells.append(rows.move[part, None].astype(np.float64))
         yield np.concatenate(cells, axis=1)
 
 
-def _states(motion: EditedMotion) -> dict[str, Array]:
-    """Return q, qd and qdd of all rows, those without columns of the curve through them."""
-    missing = [name for name in ORDERS[:3] if name not in motion.quantities]
-    curve = motion.curve() if missing else None
-    return {
-        name: motion.quantities[name]
-        if name in motion.quantities or curve is None
-        else curve.evaluate(motion.rows.t, order)
-        for order, name in enumerate(ORDERS[:3])
-    }
-
-
 def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tuple[str, ...]]:
-    """Return what a format needs beside rows, and what it makes up or leaves out."""
+    """Return what a format needs beside rows, and what it leaves out."""
     if form.content == "rows":
         return WriteOptions(), _note_of_names(motion)
     log, given = form.content == "log", motion.quantities
     stated = next((order for order, name in enumerate(ORDERS[:3]) if name not in given), 3)
-    missing = [name for name in ORDERS[1:3] if log and name not in given]
-    notes = [f"no column {name}: it is of the curve through the rows" for name in missing]
     held = (*ORDERS[:3], EFFORT) if log else ORDERS[:stated]
-    notes += [
+    notes = [
         f"the columns {name} are left out: the format is written without them"
         for name in given
         if name not in held
@@ -208,11 +194,12 @@ def _note_of_names(motion: EditedMotion) -> tuple[str, ...]:
 
 def _knots(motion: EditedMotion) -> Knots:
     """Return the rows as knots: states at whole nanoseconds from the first one on."""
-    rows, states = motion.rows, _states(motion)
+    rows = motion.rows
     nanoseconds = np.rint((rows.t - rows.t[0]) * _PER_SECOND).astype(np.int64)
     if (np.diff(nanoseconds) <= 0).any():
         raise InputError(f"{rows.source} has rows in one nanosecond, which times of ROS cannot tell apart")
-    return Knots(nanoseconds, states["q"], states["qd"], states["qdd"], Deviation(0.0, 0.0, (0, 0)))
+    states = [motion.quantities.get(name, np.empty((rows.t.size, 0))) for name in ORDERS[:3]]
+    return Knots(nanoseconds, states[0], states[1], states[2], Deviation(0.0, 0.0, (0, 0)))
 
 
 def _recording(motion: EditedMotion, knots: Knots) -> Recording:

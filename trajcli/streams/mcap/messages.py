@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,13 @@ TYPES: Mapping[str, str] = {
 """The topics in the order of their channels, and what their messages are."""
 BY_ROW = (JOINT_STATES, JOINT_ACCELERATIONS, TRAJECTORY_POINT, TOOL_TWIST)
 LATCHED = (JOINT_TRAJECTORY, ROBOT_DESCRIPTION, TF_STATIC, TOOL_PATH)
+NONE = ("", "")
+FIELDS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    JOINT_STATES: (("q", "position"), ("qd", "velocity"), ("tau", "effort")),
+    JOINT_ACCELERATIONS: (("qdd", "acceleration"), NONE, NONE),
+    TRAJECTORY_POINT: (("q", "position"), ("qd", "velocity"), ("qdd", "acceleration"), NONE),
+}
+"""The kind of columns that each sequence of a message by row holds, and its name; `NONE` is always empty."""
 OF_GEOMETRY = (ROBOT_DESCRIPTION, TF_STATIC, TF, TOOL_PATH, TOOL_TWIST)
 
 SIGNAL = "/signal/"
@@ -51,6 +58,7 @@ def topics_of(recording: Recording) -> tuple[str, ...]:
     """Return the topics that a log holds."""
     extra = (TRAJECTORY_POINT, TOOL_TWIST)
     without = () if recording.frames is not None else OF_GEOMETRY
+    without = without if recording.knots.acceleration.size else (*without, JOINT_ACCELERATIONS)
     fixed = (
         topic for topic in TYPES if topic not in without and (topic not in extra or topic in recording.topics)
     )
@@ -106,26 +114,22 @@ def message_record(channel: int, time: int, data: bytes, number: int = 0) -> byt
     return records.MESSAGE_HEAD.pack(records.MESSAGE, content, channel, number, time, time) + data
 
 
-def row_message(topic: str, joint_names: tuple[str, ...], *, efforts: bool = False) -> MessageLayout:
+def row_message(topic: str, joint_names: tuple[str, ...], kinds: Collection[str]) -> MessageLayout:
     """Return the layout of a topic with one message for each row.
 
     Args:
         topic: Which.
         joint_names: n names.
-        efforts: Whether states hold efforts, too.
+        kinds: Of the columns of the rows; what is not among them is empty.
     """
     layout, count = MessageLayout(), len(joint_names)
-    if topic == JOINT_STATES:
-        named = layout.header("").texts(joint_names)
-        named = named.sequence("position", count).sequence("velocity", count)
-        return named.sequence("effort", count) if efforts else named.count(0)
-    if topic == JOINT_ACCELERATIONS:
-        return layout.header("").texts(joint_names).sequence("acceleration", count).count(0).count(0)
     if topic == TOOL_TWIST:
         return layout.header("world").numbers("twist", 6)
-    for name in ("position", "velocity", "acceleration"):
-        layout.sequence(name, count)
-    return layout.count(0).time("from_start")
+    if topic != TRAJECTORY_POINT:
+        layout.header("").texts(joint_names)
+    for kind, name in FIELDS[topic]:
+        layout.sequence(name, count if kind in kinds else 0)
+    return layout.time("from_start") if topic == TRAJECTORY_POINT else layout
 
 
 def transform_message(pairs: Sequence[tuple[str, str]]) -> MessageLayout:
@@ -164,6 +168,7 @@ def signal_messages(recording: Recording) -> Iterator[tuple[str, int, bytes]]:
 
 def _trajectory(joint_names: tuple[str, ...], knots: Knots) -> bytes:
     """Return the message of all knots; its stamp 0 means that a controller starts at once."""
+    states = {name: getattr(knots, name) for name in ("position", "velocity", "acceleration")}
     head = MessageLayout().header("").texts(joint_names).count(knots.nanoseconds.size).template
     message, begun = head, 0
     while begun < knots.nanoseconds.size:
@@ -171,11 +176,12 @@ def _trajectory(joint_names: tuple[str, ...], knots: Knots) -> bytes:
         stop = 1 if begun == 0 else knots.nanoseconds.size
         remainder = (len(message) - 4) % 8
         layout = MessageLayout(bytes(remainder), 0)
-        for name in ("position", "velocity", "acceleration"):
-            layout.sequence(name, len(joint_names))
+        for name, values in states.items():
+            layout.sequence(name, values.shape[1])
         points = arranged(layout.count(0).time("from_start"), stop - begun)
-        for name in ("position", "velocity", "acceleration"):
-            points[name] = getattr(knots, name)[begun:stop]
+        for name, values in states.items():
+            if values.size:
+                points[name] = values[begun:stop]
         put_time(points, "from_start", knots.nanoseconds[begun:stop])
         raw = points.view(np.uint8).reshape(stop - begun, -1)
         message += raw[:, remainder:].tobytes()

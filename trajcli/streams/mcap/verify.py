@@ -42,6 +42,8 @@ def verify_mcap(
         times = np.rint(block[:, 0] * 1e9).astype(np.int64) + recording.epoch
         states = {JOINT_STATES: ("q", "qd", "tau"), JOINT_ACCELERATIONS: ("qdd",)}
         for topic, kinds in states.items():
+            if not where[kinds[0]]:
+                continue
             read = log.take(topic, len(block))
             if not np.array_equal(read[0], times):
                 raise TrajcliError(f"{topic} read back has other times than were written from row {count} on")
@@ -52,8 +54,10 @@ def verify_mcap(
 
 
 def _compare(read: Array, wanted: Array, what: str, before: int) -> None:
+    if read.shape != wanted.shape:
+        raise TrajcliError(f"the file read back has {read.shape[1]} of {wanted.shape[1]} columns {what}")
     wrong = read.view(np.int64) != np.ascontiguousarray(wanted).view(np.int64)
-    if read.shape != wanted.shape or wrong.any():
+    if wrong.any():
         row, joint = np.argwhere(wrong)[0]
         raise TrajcliError(
             f"the file read back says {read[row, joint]!r} in row {before + row}, joint {joint + 1}, of "

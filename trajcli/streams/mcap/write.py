@@ -23,8 +23,7 @@ from trajcli.streams.mcap.cdr import Bytes, put_time
 from trajcli.streams.mcap.definitions import definition_of
 from trajcli.streams.mcap.messages import (
     BY_ROW,
-    JOINT_ACCELERATIONS,
-    JOINT_STATES,
+    FIELDS,
     TF,
     TOOL_TWIST,
     TRAJECTORY_POINT,
@@ -55,12 +54,6 @@ Times = NDArray[np.int64]
 _PER_SECOND = 1e9
 _TRANSFORMS_RATE = 60.0  # Hz: what a screen shows
 _MOST = 4096  # rows, and transforms, in a chunk
-_NAMES = {"q": "position", "qd": "velocity", "qdd": "acceleration", "tau": "effort"}
-_KINDS: Mapping[str, tuple[str, ...]] = {
-    JOINT_STATES: ("q", "qd", "tau"),
-    JOINT_ACCELERATIONS: ("qdd",),
-    TRAJECTORY_POINT: ("q", "qd", "qdd"),
-}
 
 
 @frozen
@@ -92,10 +85,8 @@ class RowRecords:
         self._epoch, self._origin = recording.epoch, recording.origin
         kinds = [column.kind for column in columns]
         self._where = {kind: slice(kinds.index(kind), _end(kinds, kind)) for kind in dict.fromkeys(kinds)}
-        self._kinds = {**_KINDS, JOINT_STATES: tuple(k for k in _KINDS[JOINT_STATES] if k in self._where)}
-        efforts = "tau" in self._where
         self._layouts = {
-            topic: record_layout(topics[topic], row_message(topic, recording.joint_names, efforts=efforts))
+            topic: record_layout(topics[topic], row_message(topic, recording.joint_names, self._where))
             for topic in BY_ROW
             if topic in topics
         }
@@ -118,8 +109,9 @@ class RowRecords:
         for topic, layout in self._layouts.items():
             messages = _structures(raw, self._starts[topic], layout)
             _put_heads(messages, numbers, times)
-            for kind in self._kinds.get(topic, ()):
-                messages[_NAMES[kind]] = block[:, self._where[kind]]
+            for kind, name in FIELDS.get(topic, ()):
+                if kind in self._where:
+                    messages[name] = block[:, self._where[kind]]
             if topic == TOOL_TWIST:
                 first = self._where["vx"].start
                 messages["twist"] = block[:, first : first + 6]
@@ -197,7 +189,7 @@ def write_mcap_blocks(
     """Write a log, and yield each block as soon as its messages have left for `out`.
 
     Args:
-        rows: Blocks of shape (N, m) in SI, with t, q, qd, qdd and, for /tool_twist, the twist.
+        rows: Blocks of shape (N, m) in SI, with t, q and, for /tool_twist, the twist; qd, qdd, tau if stated.
         columns: What the rows hold.
         out: Where to; the log is complete when the iterator has ended.
         recording: What else the log holds.
