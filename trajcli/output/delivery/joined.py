@@ -126,6 +126,11 @@ def set_columns(columns: Sequence[Group]) -> str:
     return f'--set "output.columns=[{", ".join(columns)}]"'
 
 
+def _with_states(rows: JoinedRows, states: Sequence[Group]) -> tuple[Group, ...]:
+    """Return the columns of a job with some states in place of its own."""
+    return (*states, *(group for group in rows.plan.loaded.job.output.columns if group not in _STATES))
+
+
 def rows_that_keep(rows: JoinedRows, form: StreamFormat | None = None) -> Iterator[OtherRows]:
     """Yield other rows of the same motion with which it keeps the limits, joined, the simplest first.
 
@@ -171,14 +176,15 @@ def _others_at_knots(rows: JoinedRows, form: StreamFormat | None) -> Iterator[Ot
     output = {} if there else {"rows": "knots"}
     if "q" in rows.groups and not there:
         yield _other(rows, form, output)
-    for columns in (_STATES, _WITHOUT_ACCELERATION) if (form or DEFAULT).content == "rows" else ():
+    for states in (_STATES, _WITHOUT_ACCELERATION) if (form or DEFAULT).content == "rows" else ():
+        columns = _with_states(rows, states)
         if "q" not in rows.groups or replace(rows, groups=columns).interpolation != rows.interpolation:
             yield _other(rows, form, {**output, "columns": columns})
 
 
 def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
     """Yield other rows of the same motion, the simplest first."""
-    full = None if {*_STATES} <= {*rows.groups} else _STATES
+    full = None if {*_STATES} <= {*rows.groups} else _with_states(rows, _STATES)
     if "q" not in rows.groups and full is None:
         return  # rows of the tool alone
     content, there = (form or DEFAULT).content, rows.plan.loaded.job.output.rows == "knots"
@@ -186,7 +192,7 @@ def _others(rows: JoinedRows, form: StreamFormat | None) -> Iterator[OtherRows]:
     if full is not None and content == "rows" and not there:
         yield _other(rows, form, {"columns": full})
     if content != "log" and "qdd" in rows.groups and not (there and content == "rows"):
-        yield _other(rows, form, {"columns": _WITHOUT_ACCELERATION})
+        yield _other(rows, form, {"columns": _with_states(rows, _WITHOUT_ACCELERATION)})
     rate = rate_that_keeps(rows)
     if rate is not None:
         yield _other(rows, form, {"rate": rate})
