@@ -326,3 +326,14 @@ def test_times_outside_the_trajectory_are_said_in_their_place(job: Path, capfd: 
     code, _, err = call(capfd, "plan", job)
     assert code == 2
     assert f"{job}:7:17: error: the time 5 s lies outside the trajectory" in err
+
+
+@pytest.mark.parametrize("forms", [("json", "text"), ("=json", "=text"), ("json", "=text"), ("text", "json")])
+@pytest.mark.parametrize("wrong", [("--nothing",), ()])
+def test_the_last_form_of_errors_holds(
+    forms: tuple[str, ...], wrong: tuple[str, ...], capfd: Capture
+) -> None:
+    """For errors of usage as for all others, wherever an option is said twice."""
+    words = [part for form in forms for part in (("--errors" + form,) if "=" in form else ("--errors", form))]
+    err = call(capfd, "plan", "none.yaml", *wrong, *words).err
+    assert err.startswith("{") == (forms[-1] == "json")

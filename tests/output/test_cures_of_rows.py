@@ -116,7 +116,9 @@ def test_rows_that_a_cure_names_are_those_of_the_job_that_follows_it(
     assert [other.options for other in others] == cures
     for other in others:
         made = rows_of(JOB, followed(output, other.options), form)
-        assert {*columns} - {*STATES} <= {*followed(output, other.options)["columns"]}  # what a job asks for stays
+        assert {*columns} - {*STATES} <= {
+            *followed(output, other.options)["columns"]
+        }  # what a job asks for stays
         assert times(other.rows).tolist() == times(made).tolist()
         assert (other.rows.groups, other.rows.interpolation) == (made.groups, made.interpolation)
         assert other.rows.grid.start_time == 2.5

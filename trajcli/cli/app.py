@@ -102,13 +102,11 @@ def _first_sentence(text: str) -> str:
 
 
 def _form_of_errors(words: Sequence[str]) -> Any:  # noqa: ANN401
-    """Return in which form for programs errors are wanted; None where they are for people."""
-    options = list(words[: words.index("--")] if "--" in words else words)
-    forms = ("json", "github", "junit", "sarif")
-    asked = (
-        form for form in forms if f"--errors={form}" in options or ("--errors", form) in pairwise(options)
-    )
-    return next(asked, None)
+    """Return in which form for programs errors are wanted; None where they are for people. The last holds."""
+    options = words[: words.index("--")] if "--" in words else words
+    parts = [part for word in options for part in word.split("=", 1 if word.startswith("--errors=") else 0)]
+    asked = [form for name, form in pairwise(parts) if name == "--errors"][-1:]
+    return next((form for form in asked if form in ("json", "github", "junit", "sarif")), None)
 
 
 def application(commands: Sequence[type[CommandLine]]) -> typer.Typer:
