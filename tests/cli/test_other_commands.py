@@ -121,6 +121,7 @@ def test_init_writes_a_job_that_plans(capfd: Capture) -> None:
     code, out, _ = call(capfd, "plan", "job.yaml")
     assert code == 0
     assert out.startswith("t,q1_deg,")
+    assert call(capfd, "plan", "job.yaml", "--strict", "--no-output").code == 0
     starter = Path("job.yaml").read_text()
     assert call(capfd, "init", "-").out == starter
     assert {"frames", "tool", "- {repeat"} <= set(re.findall(r"^ *# (frames|tool|- \{repeat)", starter, re.M))
