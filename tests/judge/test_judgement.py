@@ -127,12 +127,12 @@ def test_what_rounding_explains_is_nothing_where_a_consumer_joins_them_either() 
 
 @pytest.mark.parametrize("rule", ["limit", "path"])
 def test_of_joined_rows_what_is_just_above_a_limit_is_nothing(rule: str) -> None:
-    """Certain or not: knots stand in whole nanoseconds. Of a limit of zero there is no share."""
+    """Certain or not: knots stand in whole nanoseconds. Of a limit of zero there is no share: what is certain counts."""
     near, far = finding(1 + 0.5e-5, rule=rule), finding(1 + 2e-5, rule=rule)
-    rounded = finding(rule=rule, certainty="within rounding")
-    nothing = finding(limit=0.0, rule=rule, certainty="within rounding")
-    found = as_joined(Judgement((near, rounded, far, nothing), "cubic", 2)).findings
-    assert found == (far, nothing)
+    rounded, nothing = (finding(limit=limit, rule=rule, certainty="within rounding") for limit in (1.0, 0.0))
+    zero, unnamed = (finding(limit=limit, rule=rule) for limit in (0.0, None))
+    found = as_joined(Judgement((near, rounded, far, nothing, zero, unnamed), "cubic", 2)).findings
+    assert found == (far, zero, unnamed)
 
 
 @pytest.mark.parametrize("limit", [-1.0, 1.0])

@@ -147,6 +147,47 @@ def test_the_columns_that_join_knots_to_the_motion_are_named() -> None:
     assert factor_by_scipy(planned("blends_ur5e", sets[0], "output.columns=[t, q, qd]")) < 1 + 1e-6
 
 
+AT_A_STOP = """\
+version: 1
+robot: {{joints: [{{name: a, position: [{low}, 2], {rule}velocity: 3, acceleration: 40}}]}}
+start: {{joints: [0]}}
+moves:
+  - {{planner: hold, duration: 0.509}}
+  - {{planner: trapezoid, to: {{joints: [1]}}, acceleration: 2, velocity: 0.5}}
+output: {{rate: 100}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("low", "rule", "kind"),
+    [
+        (0, "", "position"),
+        (-0.05, "velocity_by_position: {deceleration: 1, offset: 0.5}, ", "velocity by position"),
+    ],
+)
+def test_a_limit_of_zero_that_rows_pass_is_said(low: float, rule: str, kind: str) -> None:
+    """Scipy's curve through the rows swings back from where the joint stands, that through the knots does not."""
+    plan = plan_job(job_from_text(AT_A_STOP.format(low=low, rule=rule)))
+    for rows in ("rate", "knots"):
+        output = plan.loaded.job.output.model_copy(update={"rows": rows})
+        job = plan.loaded.job.model_copy(update={"output": output})
+        other = replace(plan, loaded=replace(plan.loaded, job=job))
+        grid = grid_of(other)
+        parts = zip(sample(plan.trajectory, grid, ("q", "qd", "qdd")), grid.blocks(), strict=True)
+        states, (_, local) = next(parts)
+        curve = BPoly.from_derivatives(local, states[:, :, None])
+        swings = float(curve(np.linspace(0.5, 0.51, 101)).min()) < -1e-9
+        shown, judged = with_event(other, joined_rows(other, grid, FORMATS["csv"]), FORMATS["csv"])
+        said = [event.message for event in shown.events if event.kind == "joined_over_limit"]
+        assert swings == bool(said) == (rows == "rate")
+        if said:
+            assert f"pass the limit of the {kind} of a, which is 0 there; `--rows knots` keeps" in said[0]
+            assert judged is not None
+            report = rows_report(joined_rows(other, grid, FORMATS["csv"]), judged)
+            assert report.worst is not None
+            assert (report.verdict, str(report.worst.limit)) == ("exceeded", "0.0")
+
+
 def test_plan_and_check_say_the_same(tmp_path: Path) -> None:
     plan, file = planned("ur5e_pick"), tmp_path / "rows.csv"
     trajcli.plan(EXAMPLES / "ur5e_pick.yaml").save(file)

@@ -136,6 +136,6 @@ def test_what_no_slowness_cures_is_left() -> None:
     ]
     for one in hopeless:
         assert tightened(planned(), [found("velocity", 1.1, 0), one], (), Adaptation()) is None
-    assert [may_be_cured(one) for one in hopeless] == [True, True, False, False]
+    assert [may_be_cured(one) for one in hopeless] == [True, True, True, False]
     assert tightened(planned("error"), (), [(1.1, 1, 0, 0)], Adaptation()) is None
     assert tightened(planned(), (), (), Adaptation()) is None

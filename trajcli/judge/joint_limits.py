@@ -348,6 +348,6 @@ def _fast_approaches(
     sign = np.where(upwards, 1.0, -1.0)
     rounding = errors[1] + np.maximum(roomy - bound, 0.0)
     if of_rows:
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             used = np.abs(speed) / bound
     return _FastApproaches(piece, joint, local, distance, speed, sign * bound, rounding, used)

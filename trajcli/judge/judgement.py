@@ -117,7 +117,7 @@ def as_planned(judgement: Judgement, slack: float = JOINED_RELATIVE) -> Judgemen
         or (finding.rule not in _RATES_OF_ROWS and finding.certainty == "exceeded")
         if finding.excess > 1 + slack
     ]
-    over = [f for f in findings if f.rule != "state" and f.limit]
+    over = [f for f in findings if f.rule != "state" and f.limit is not None]
     events = judgement.events
     if over:
         worst = max(over, key=lambda finding: finding.excess)
@@ -126,7 +126,8 @@ def as_planned(judgement: Judgement, slack: float = JOINED_RELATIVE) -> Judgemen
         what += " of the tool" if of_tool else "" if worst.joint is None else f" of {worst.joint}"
         passed = "tolerance of the path of the tool" if worst.kind == "deviation" else f"limit of the {what}"
         said = f"joined_over_limit: the rows, joined between them, pass the {passed}"
-        events = (*events, f"{said}, by a factor of {worst.excess:.6g}")
+        factor = f"by a factor of {worst.excess:.6g}" if worst.limit else "which is 0 there"
+        events = (*events, f"{said}, {factor}")
     return replace(judgement, findings=worst_first(findings), events=events, planned_rows=True)
 
 
@@ -139,7 +140,7 @@ def as_joined(judgement: Judgement) -> Judgement:
         finding
         for finding in judgement.findings
         if finding.rule not in _OF_LIMITS
-        or not finding.limit
+        or finding.limit is None
         or (finding.certainty == "exceeded" and finding.excess > 1 + JOINED_RELATIVE)
     )
     return replace(judgement, findings=findings, planned_rows=True)

@@ -49,21 +49,21 @@ class ApproachSurvey(LimitSurvey):
 
 def approach_excess(joints: NamedJoints, use: ApproachUse) -> Finding:
     """Return where a joint is over its limit, with the sentence that says it."""
-    joint = use.component
+    joint, limit = use.component, use.limit + 0.0  # no -0
     where = "beyond" if use.distance < 0 else "before"
-    rule = "where its limit is {limit}" if use.limit else "where it may not move towards it ({limit})"
+    rule = "where its limit is {limit}" if limit else "where it may not move towards it ({limit})"
     return Finding(
         kind="velocity_by_position",
         joint=joints.joint_names[joint],
         value=use.velocity,
-        limit=use.limit,
+        limit=limit,
         time=use.time,
         factor=use.used if use.used < _HOPELESS else None,
         message=f"the velocity of {{joint}} reaches {{value}} {at_time(use.time)}, "
         f"{{distance}} {where} the end of its range, {rule}",
         amounts={
             **joint_amounts(joints, joint, 0, distance=abs(use.distance)),
-            **excess_amounts(joints, joint, 1, use.velocity, use.limit),
+            **excess_amounts(joints, joint, 1, use.velocity, limit),
         },
     )
 

@@ -103,7 +103,7 @@ class ForConsumer:
     @property
     def over(self) -> tuple[Finding, ...]:
         """What keeps the rows from being written: limits, and necessary rules."""
-        limits = () if self.joined is None else (f for f in self.joined.findings if f.limit)
+        limits = () if self.joined is None else (f for f in self.joined.findings if f.limit is not None)
         rules = () if self.rules is None else (f for f in self.rules.findings if f.severity == "error")
         return (*limits, *rules)
 
@@ -229,7 +229,7 @@ class _Search:
         first = self._first
         if first is None or loaded is not self._loaded or adapted is not self._begun:
             return self.attempt(loaded, adapted)
-        over = first.joined is not None and any(finding.limit for finding in first.joined.findings)
+        over = first.joined is not None and any(found.limit is not None for found in first.joined.findings)
         return replace(first, rules=None) if over else first
 
     def attempt(
@@ -248,7 +248,7 @@ class _Search:
         if not plan.verdict.passed:
             return made
         joined, rules = rows.judgement(slack=_SLACK), None
-        if by_rules or joined is None or not any(finding.limit for finding in joined.findings):
+        if by_rules or joined is None or all(found.limit is None for found in joined.findings):
             rules = judge_as_written(plan, grid, self._profile, writing.form, digits=digits, log=writing.log)
             rules = replace(rules, findings=tuple(_in_its_move(found, plan) for found in rules.findings))
         made = replace(made, joined=joined, rules=rules)

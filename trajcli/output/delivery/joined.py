@@ -78,7 +78,7 @@ def rows_report(rows: JoinedRows, judged: Judgement) -> RowsReport:
     """Return the part of the report about rows, from `with_event`."""
     from trajcli.job.report import RowsReport, WorstOfRows
 
-    over = [found for found in judged.findings if found.limit]
+    over = [found for found in judged.findings if found.limit is not None]
     if not over:
         return RowsReport(interpolation=judged.interpolation, verdict="satisfied")
     worst = max(over, key=lambda found: found.excess)

@@ -38,13 +38,13 @@ _NOISE = 120.0  # last bits of a position at both ends of an interval h: 60 / h^
 
 def may_be_cured(finding: Finding) -> bool:
     """Return whether other rows, or a slower motion, may help against a finding of its kind."""
-    return (finding.kind in STRETCHABLE or finding.kind == "deviation") and finding.move is not None
+    return finding.kind in {*STRETCHABLE, "deviation", "position"} and finding.move is not None
 
 
 def _curable(finding: Finding) -> bool:
     """Return whether a slower motion may help against a finding."""
     worst = _FURTHEST if finding.kind == "deviation" else _HOPELESS
-    return may_be_cured(finding) and bool(finding.limit) and finding.excess < worst
+    return may_be_cured(finding) and finding.kind != "position" and finding.excess < worst
 
 
 def tightened(
