@@ -162,12 +162,63 @@ def test_a_curve_ends_in_its_target_to_the_last_bits(order, longest):
         assert (np.abs(ends - final) <= 3e-15 * sizes).all()
 
 
-def test_a_cruise_is_without_acceleration_but_for_rounding_of_its_peak():
+@pytest.mark.parametrize(("scale", "length"), [(1.0, 5.0), (1e6, 5.0), (1e-6, 5.0), (1.0, 5e6)])
+def test_a_cruise_is_without_acceleration_but_for_rounding_of_its_peak(scale, length):
     """At 1e-6 of the peak a phase without jerk still changes its velocity; at 1e-12 only rounding says so."""
     for left, cruising in ((1e-6, set()), (-1e-6, set()), (1e-12, {2}), (-1e-12, {2})):
-        jerks = [30.0, -30.0 * (1 - left), 0.0]
-        chain = chain_of(np.zeros(3), [np.nan] * 3, [0.1, 0.1, 5.0], jerks).with_cruises()
+        jerks = [30.0 * scale, -30.0 * (1 - left) * scale, 0.0]
+        chain = chain_of(np.zeros(3), [np.nan] * 3, [0.1, 0.1, length], jerks).with_cruises()
         assert chain.cruising == cruising
+    twice = chain_of(np.zeros(3), [np.nan] * 3, [0.1, 0.1, 5.0] * 2, [30.0, -30.0, 0.0] * 2)
+    assert twice.with_cruises().cruising == {2, 5}
+
+
+def double_s(error):
+    """Return phases from rest to rest with a cruise, whose durations are off by a part of themselves."""
+    durations, jerks = [0.1, 0.3, 0.1, 5.0, 0.1, 0.3, 0.1], [30.0, 0.0, -30.0, 0.0, -30.0, 0.0, 30.0]
+    final = integrate(np.zeros(3), durations, jerks)
+    off = np.array(durations) * (1 + error * np.array([1.0, -0.5, 0.2, 1.0, -1.0, 0.7, 0.3]))
+    return replace(chain_of(np.zeros(3), final, off, jerks), cruising=frozenset({3}))
+
+
+@pytest.mark.parametrize("error", [1e-8, 1e-3])
+@pytest.mark.parametrize("fixed", [False, True])
+def test_durations_alone_are_corrected_where_they_suffice(fixed, error):
+    """The limit of the jerk is kept as it was, and the acceleration is over where the cruise begins."""
+    missing = double_s(error)
+    duration = 6.0 if fixed else None
+    landed, miss = missing.polished(duration)
+    assert miss < 1e-14
+    assert landed.constants == missing.constants
+    at_cruise = integrate(landed.initial, landed.durations[:3], landed.constants[:3])
+    assert at_cruise[2] == pytest.approx(0.0, abs=1e-14)
+    end = integrate(landed.initial, landed.durations, landed.constants)
+    np.testing.assert_allclose(end, landed.final, rtol=0, atol=1e-13)
+    assert not fixed or landed.duration == pytest.approx(duration, rel=1e-15)
+
+
+def test_short_phases_behind_a_long_one_raise_no_constant():
+    """Before the longest one, where sums of times are rounded to a thousandth of what is short."""
+    for first in np.linspace(1000.0, 1100.0, 20) + 0.123:
+        durations, jerks = [first, 3e-10, 2e-10, 3e-10, 4000.0], [0.0, 7.0, 0.0, -7.0, 0.0]
+        chain = chain_of([0.0, 0.5, 0.0], [np.nan] * 3, durations, jerks)
+        breaks, derivatives = chain.pieces(chain.duration)
+        assert (np.diff(breaks)[:4] >= durations[:4]).all()
+        assert np.abs(derivatives[0]).max() <= 7.0
+
+
+def test_what_no_constant_can_mend_is_laid_into_the_longest_phase():
+    """A steady speed that is to lead a little further: the break to the next phase takes what is left of it."""
+    chain = chain_of([0.0, 0.5], [3.5 + 1e-9, 0.5], [1.0, 4.0, 2.0], [0.0, 0.0, 0.0])
+    (first, last), (speeds, _) = (chain.curve(0.0, 7.0).piece_ends(order) for order in (0, 1))
+    assert last[-1, 0] == pytest.approx(3.5 + 1e-9, rel=1e-15)
+    assert last[0, 0] == first[1, 0] == 0.5
+    assert speeds[:2, 0] == pytest.approx([0.5, 0.5 + 2.5e-10], rel=1e-15)
+    np.testing.assert_allclose(last[1], first[2], rtol=0, atol=1e-9)
+
+
+def test_what_is_no_number_is_no_small_miss():
+    assert np.isnan(chain_of(np.zeros(3), [1.0, 0.0, 0.0], [1.0, 1.0], [1.0, np.nan]).defect())
 
 
 def test_merged_variables_are_those_of_their_own_curves():

@@ -69,11 +69,19 @@ def test_knots_far_apart_are_made_faster_up_to_their_limits(tmp_path: Path) -> N
     assert stretch.binding.kind == "acceleration"
 
 
-def test_what_no_time_mends_is_said_at_the_time_of_the_file(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("reached", "hint"), [(2.0, "another time of the motion does not help"), (200.0, "degrees?")]
+)
+def test_what_no_time_mends_is_said_at_the_time_of_the_file(
+    reached: float, hint: str, tmp_path: Path
+) -> None:
     source, arm = tmp_path / "late.csv", robot(tmp_path / "arm.yaml", "position: [-1, 1]")
-    source.write_text("t,q1\n110.0,0.0\n111.0,2.0\n112.0,0.0\n")
-    with pytest.raises(VerificationError, match="at t = 111 s"):
+    source.write_text(f"t,q1\n110.0,0.0\n111.0,{reached}\n112.0,0.0\n")
+    with pytest.raises(VerificationError, match="at t = 111 s") as refused:
         retimed(source, arm)
+    (problem,) = refused.value.problems
+    assert (problem.joint, problem.time, problem.kind) == ("j1", 111.0, "position")
+    assert hint in str(problem.hint)
 
 
 @pytest.mark.parametrize("fastest", [False, True])
@@ -545,3 +553,12 @@ def test_stamps_nearer_than_a_millisecond_have_more_decimals(tmp_path: Path) -> 
     assert stretch.factor == pytest.approx(1.875 / 137, rel=2e-4)
     said = found.as_written().rows.t
     np.testing.assert_allclose(said, np.arange(101) / 100 * stretch.factor, rtol=0, atol=6e-13)
+
+
+@pytest.mark.parametrize("velocity", [1e4, 0.01])
+def test_a_factor_may_be_far_from_one(velocity: float, tmp_path: Path) -> None:
+    """A hundred rows in 0.2 ms, and in three minutes."""
+    arm = robot(tmp_path / "arm.yaml", f"velocity: {velocity}")
+    found, stretch = retimed(rows_of(tmp_path / "rows.csv"), arm, fastest=True)
+    assert stretch.factor == pytest.approx(1.875 / velocity, rel=2e-4)
+    assert found.rows.t[-1] == pytest.approx(stretch.factor, rel=1e-6)

@@ -295,3 +295,46 @@ def test_rows_that_state_more_than_the_way_to_the_end_allows_are_certain_whateve
         assert told.time == pytest.approx(t[-1], abs=3e-3)
         assert abs(told.limit) == pytest.approx(speed - beyond, abs=0.01)
         assert told.factor == pytest.approx(told.value / told.limit)
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("share", [0.97, 0.995, 1.005])
+def test_what_a_weight_takes_between_sparse_rows_is_hidden_by_no_short_interval(
+    share: float, side: int
+) -> None:
+    """2 kg lifted with 3 m/s^2 at most, 0.15 less at the rows beside; the first slide bears it and stands still.
+
+    Six decimals make hundreds of newtons of an interval of 0.1 ms.
+    """
+    t, w = np.sort(np.append(np.arange(11) * 0.1, 0.5001)), 2 * np.pi
+    states = (-np.sin(w * t) / w**2, -np.cos(w * t) / w, np.sin(w * t))
+    rows = [np.round(np.stack([0 * t, 3.0 * side * each], axis=1), 6) for each in states]
+    half, lifted = np.full(2, 0.5e-6), MASS * (9.81 + 3.0)
+    motion = RecordedMotion(t, *rows, None, None, None, None, Resolution(0.0, half, half, half), "rows")
+    arm = replace(slides(side, share * lifted), gravity=side * np.array([0.0, 9.81, 0.0]))
+    found = [f for f in judge_motion(lambda: [motion], Requirements(arm)).findings if f.kind == "effort"]
+    told = [each for each in found if each.certainty == "exceeded"]
+    assert len(told) == (share < 1)
+    for each in told:
+        assert (each.joint, each.severity, each.method) == ("s1", "error", "bounded")
+        assert each.value == pytest.approx(side * lifted, rel=1e-3)
+        assert each.time == pytest.approx(0.25, abs=1e-3)
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("coarse", [0, 1])
+def test_a_last_velocity_of_a_unit_turns_no_slide_back_whichever_has_fewer_decimals(
+    coarse: int, side: int
+) -> None:
+    """Braking 2 kg by 10 m/s^2 takes 19 N with 1 N of friction, and 21 N if the last row went back."""
+    t, off = 0.008 * np.arange(8), np.full(2, 0.5e-12)
+    off[coarse] = 0.5e-5
+    braked = [0.56 * t - 5.0 * t**2, 0.56 - 10.0 * t, 0.0 * t - 10.0]
+    rows = [side * np.tile(each[:, None], (1, 2)) for each in braked]
+    rows[1][-1] = -0.9 * side * off
+    arm = slides(-side, 20.5)
+    arm = replace(arm, joints=tuple(replace(joint, friction=Friction(1.0, 0.0)) for joint in arm.joints))
+    exact = np.zeros(2)
+    motion = RecordedMotion(t, *rows, None, None, None, None, Resolution(0.0, exact, off, exact), "rows")
+    errors = judge_motion(lambda: [motion], Requirements(arm)).errors
+    assert not [each for each in errors if each.kind == "effort"]

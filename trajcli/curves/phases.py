@@ -86,18 +86,10 @@ class PhaseChain:
 
     def _walk(self) -> _Walk:
         """Return the states before each phase and at the end, and what is seen at cruises and beside them."""
-        state = [*self.initial]
-        rows, leftover, driving = [], [], []
-        for k, (time, constant) in enumerate(zip(self.durations, self.constants, strict=True)):
-            if k in self.cruising:
-                leftover.append(state[-1])
-                state[-1] = 0.0
-            else:
-                driving.append(time)
-            rows.append(state)
-            state = _after(state, constant, time)
-        rows.append(state)
-        return rows, leftover, driving
+        rows = [[*self.initial]]
+        for time, constant in zip(self.durations, self.constants, strict=True):
+            rows.append(_after(rows[-1], constant, time))
+        return rows, [], []
 
     def _walk_of_third_order(self) -> _Walk:
         """Return the same of phases with constant jerk, of which there are many."""

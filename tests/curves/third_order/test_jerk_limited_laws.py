@@ -16,6 +16,7 @@ from trajcli.curves.third_order.convex_step import faster
 from trajcli.curves.third_order.curved_paths import rounded_polyline
 from trajcli.curves.third_order.interior_point import ChainProgram
 from trajcli.curves.third_order.parameterization import jerk_limited_time_optimal
+from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
 
 ORACLES = Path(__file__).parents[2] / "oracles" / "jerk_limited_splines.yaml"
@@ -243,6 +244,20 @@ def test_what_no_step_takes_away_is_left_to_slowing_down_by_little(left, accepte
     law = jerk_limited_time_optimal(*problem, **how).law
     assert law.duration == pytest.approx(found[0].duration * (1.0 + left), rel=1e-9)
     assert law.evaluate(0.0, 1)[0] == pytest.approx(how["start"][0] / (1.0 + left), rel=1e-9)
+
+
+@pytest.mark.parametrize(("bent", "start", "end"), [(0.75, 0.05, 0.0), (0.25, 0.0, 0.05)])
+def test_a_limit_that_is_passed_without_hope_is_named_where_it_is_passed(bent, start, end):
+    """It is one of a second arm, which bends about that place alone."""
+    knots = np.array([0.0, bent - 0.05, bent, bent + 0.05, 1.0])
+    bend = spline(knots, np.array([[0.0], [0.0], [0.03], [0.0], [0.0]]))
+    other = JointConstraint(bend, both([1.0]), both([2.0]))
+    line = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[1.0]], [[0.0]]]))
+    ends = {"start": (start, 0.0), "end": (end, 0.0), "hopeless": 1.0001}
+    with pytest.raises(UnsettledSpeedError) as caught:
+        jerk_limited_time_optimal(line, both([9.0]), both([9.0]), both([100.0]), further=[other], **ends)
+    assert caught.value.s == pytest.approx(bent, abs=0.1)
+    assert 1.0 < caught.value.over < 3.0
 
 
 @pytest.mark.soak
