@@ -147,3 +147,15 @@ def test_one_row_is_no_motion_and_two_are(tmp_path: Path) -> None:
     found = read_motion(str(path), ReadingOptions(units="rad"))
     assert found.rows.t.tolist() == [0, 1]
     assert found.notes == ("columns that are left out: other",)
+
+
+@pytest.mark.parametrize("names", ["t,q1,q2,qd1,qd2", "time_ms,q1_deg,q2_mm,qd1_deg,qd2_mm"])
+@pytest.mark.parametrize("second", ["1,2,3,4,5", "0.5,1.25,2.5,3,4.125"])
+def test_who_reads_what_is_written_takes_it_for_as_certain(names: str, second: str, tmp_path: Path) -> None:
+    """The peer is the reader of the same rows: whole degrees are rounded, whole radians are not."""
+    (tmp_path / "rows.csv").write_text(f"{names}\n0,0,0,0,0\n{second}\n")
+    slide = ("revolute", "prismatic")
+    motion = read_motion(str(tmp_path / "rows.csv"), ReadingOptions(), joint_types=slide)
+    read, said = motion.rows.resolution, motion.as_written().rows.resolution
+    for name in ("time", "q", "qd"):
+        assert getattr(said, name) == pytest.approx(getattr(read, name), rel=1e-12)

@@ -92,9 +92,9 @@ def test_only_what_is_wrong_with_another_joint_is_new(tmp_path: Path) -> None:
 
 
 def test_what_is_rounded_is_judged_as_it_is_written(tmp_path: Path) -> None:
-    """Velocities in whole numbers are right as far as these say; those of the other sign are wrong."""
+    """Velocities of one decimal are right as far as it says; those of the other sign are wrong."""
     motion = parabolas(tmp_path / "a.csv", 1)
-    rounded = tuple(replace(c, decimals=0) if c.quantity == "qd" else c for c in motion.columns)
+    rounded = tuple(replace(c, decimals=1) if c.quantity == "qd" else c for c in motion.columns)
     assert new_jumps(motion, motion) == []
     assert new_jumps(motion, replace(motion, columns=rounded)) == [], (
         "as far as their decimals say they are right"

@@ -278,7 +278,7 @@ output: {rate: 50, columns: [t, q, qd, qdd, move]}
     assert held[-1] - held[0] == pytest.approx(0.4 - 1 / 50)
 
 
-@pytest.mark.parametrize("velocity", ["[20, 0]", "[-20, 0]", "[0, -20]"])
+@pytest.mark.parametrize("velocity", ["[20, 0]", "[-20, 0]", "[0, -20]", "[0, 1]"])
 def test_moves_that_meet_in_motion_share_a_factor(velocity: str, tmp_path: Path) -> None:
     """Whichever joint moves, and whatever way."""
     job = JOB.replace("joints: [30, -20]}", f"joints: [30, -20], velocity: {velocity}}}")
@@ -553,6 +553,13 @@ def test_stamps_nearer_than_a_millisecond_have_more_decimals(tmp_path: Path) -> 
     assert stretch.factor == pytest.approx(1.875 / 137, rel=2e-4)
     said = found.as_written().rows.t
     np.testing.assert_allclose(said, np.arange(101) / 100 * stretch.factor, rtol=0, atol=6e-13)
+    t = np.append([0.0, 2e-4], np.arange(1, 101) / 100)  # one of them is enough
+    rows = zip(t, *quintic(t, 1.0, 1.0)[:2], strict=True)
+    (tmp_path / "rows.csv").write_text(
+        "t,q1,qd1\n" + "".join(f"{a:.4f},{b:.17g},{c:.17g}\n" for a, b, c in rows)
+    )
+    slower, _ = retimed(tmp_path / "rows.csv", robot(arm, "velocity: 1.5"))
+    assert slower.columns[0].decimals == 12
 
 
 @pytest.mark.parametrize("velocity", [1e4, 0.01])
@@ -562,3 +569,57 @@ def test_a_factor_may_be_far_from_one(velocity: float, tmp_path: Path) -> None:
     found, stretch = retimed(rows_of(tmp_path / "rows.csv"), arm, fastest=True)
     assert stretch.factor == pytest.approx(1.875 / velocity, rel=2e-4)
     assert found.rows.t[-1] == pytest.approx(stretch.factor, rel=1e-6)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_weight_that_no_time_makes_lighter_is_named(side: int, tmp_path: Path) -> None:
+    """The second joint holds 1 kg half a metre out, 4.9 N m, and 4 are allowed; it moves by a hundredth of a radian."""
+    arm, source = tmp_path / "arm.yaml", tmp_path / "rows.csv"
+    link = "link: {mass: 1, com: [-0.5, 0, 0], inertia: [0.08, 0.08, 0.08, 0, 0, 0]}"
+    arm.write_text(
+        "name: arm\nconvention: standard\nbase: {rpy: [90 deg, 0, 0]}\njoints:\n"
+        f"  - {{name: base, {link}}}\n  - {{name: arm, a: 1, effort: 4, {link}}}\n"
+    )
+    first = 0.0 if side > 0 else np.pi
+    source.write_text(f"t,q1,q2,qd1,qd2\n0,0,{first},0,0\n1,0,{first + 0.01},0,0\n2,0,{first},0,0\n")
+    limits = kept_limits(None, str(arm))
+    motion = read_motion(str(source), ReadingOptions(), joints=limits.robot.joint_names)
+    with pytest.raises(
+        VerificationError, match="no stretch keeps the limits: arm needs a torque of"
+    ) as refused:
+        retime(motion, limits.requirements)
+    (problem,) = refused.value.problems
+    assert (problem.joint, problem.kind) == ("arm", "effort")
+
+
+@pytest.mark.parametrize(
+    ("decimals", "velocity", "fewer"), [(5, 200.0, 9), (3, 6.0, 3), (3, 20.0, 2), (3, 200.0, 1), (2, 20.0, 1)]
+)
+def test_velocities_of_few_decimals_that_become_larger_are_written_with_those_that_are_certain(
+    decimals: int, velocity: float, fewer: int, tmp_path: Path
+) -> None:
+    """Rounded to a half of the last decimal, then made ten times as large: whoever reads them finds no contradiction."""
+    t = np.arange(1001) / 1000
+    q, qd, *_ = quintic(t, 1.0, 1.0)
+    source, arm = tmp_path / "rows.csv", robot(tmp_path / "arm.yaml", f"velocity: {velocity}")
+    lines = (f"{a:.4f},{b:.9f},{c:.{decimals}f}\n" for a, b, c in zip(t, q, qd, strict=True))
+    source.write_text("t,q1,qd1\n" + "".join(lines))
+    found, stretch = retimed(source, arm, fastest=True)
+    assert stretch.factor == pytest.approx(1.875 / velocity, rel=0.01)
+    lost = max(decimals - fewer, 0)
+    assert [column.decimals for column in found.columns] == [12, 9, fewer]
+    told = [f"with {lost} decimal{'s' * (lost > 1)} fewer" in note for note in found.notes]
+    assert told == [True] * (lost > 0)
+    write_motion(found, str(tmp_path / "out.csv"))
+    assert verdict(tmp_path / "out.csv", arm) == "satisfied"
+
+
+def test_whole_numbers_of_radians_per_second_are_exact_to_who_reads_them(tmp_path: Path) -> None:
+    """Where no decimal of the velocities is certain there is no file that keeps its word."""
+    t = np.arange(501) / 500
+    q, qd, *_ = quintic(t, 1.0, 1.0)
+    lines = (f"{a:.3f},{b:.9f},{c:.2f}\n" for a, b, c in zip(t, q, qd, strict=True))
+    source = tmp_path / "rows.csv"
+    source.write_text("t,q1,qd1\n" + "".join(lines))
+    with pytest.raises(VerificationError, match="the velocity of j1 says 19 rad/s"):
+        retimed(source, robot(tmp_path / "arm.yaml", "velocity: 20"), fastest=True)

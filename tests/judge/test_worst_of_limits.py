@@ -338,3 +338,45 @@ def test_a_last_velocity_of_a_unit_turns_no_slide_back_whichever_has_fewer_decim
     motion = RecordedMotion(t, *rows, None, None, None, None, Resolution(0.0, exact, off, exact), "rows")
     errors = judge_motion(lambda: [motion], Requirements(arm)).errors
     assert not [each for each in errors if each.kind == "effort"]
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(("largest", "over"), [(9.0, True), (6.0, False)])
+def test_what_dense_rows_of_a_later_move_state_is_hidden_by_no_short_interval(
+    largest: float, side: int, *, over: bool
+) -> None:
+    """2 kg that swing; 7.6 m/s^2 are allowed, and velocities of three decimals make 10 of an interval of 0.1 ms."""
+    t, w = np.append([-1.0, -0.5], np.sort(np.append(np.arange(251) * 4e-3, 0.5001))), 2 * np.pi
+    swings = np.maximum(t, 0.0)
+    q = side * largest * (-np.sin(w * swings) / w**2 - np.minimum(t, 0.0) / w)
+    qd = side * largest * -np.cos(w * swings) / w
+    rows = [np.stack([0 * t, np.round(each, places)], axis=1) for each, places in ((q, 6), (qd, 3))]
+    resolution = Resolution(0.0, np.full(2, 0.5e-6), np.full(2, 0.5e-3), np.zeros(2))
+    moves = (t >= 0).astype(int)
+    motion = RecordedMotion(t, *rows, None, None, None, moves, None, resolution, "rows")
+    arm = slides(side, MASS * 7.6)
+    required = Requirements(arm, by_move={0: arm, 1: arm})
+    found = [f for f in judge_motion(lambda: [motion], required).findings if f.kind == "effort"]
+    certain = [each for each in found if (each.certainty, each.severity) == ("exceeded", "error")]
+    assert len(certain) == over
+    for each in certain:
+        assert (each.move, each.joint, each.method) == (1, "s1", "sampled")
+        assert each.value == pytest.approx(side * MASS * largest, rel=0.06)
+        assert each.time == pytest.approx(0.25, abs=0.05)
+        assert each.time == pytest.approx(t[each.row - 1 : each.row + 1].mean(), abs=1e-9)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_friction_of_a_joint_that_turns_back_makes_no_force_of_another_uncertain(side: int) -> None:
+    """The second slide speeds up by 1.05 m/s^2 in 8 ms, the first one goes to and fro against 5 N of friction."""
+    t, k = 0.008 * np.arange(8), np.arange(8)
+    qd = np.stack([np.where(k % 2, 1.2e-3, -1e-3), side * np.where(k < 4, 0.0, 1.05 * 0.008)], axis=1)
+    q = np.concatenate([np.zeros((1, 2)), np.cumsum(0.004 * (qd[1:] + qd[:-1]), axis=0)])
+    q[4:, 1] += side * 0.008**2 * 0.2 / 6
+    exact = np.zeros(2)
+    motion = RecordedMotion(t, q, qd, None, None, None, None, None, Resolution(0.0, *[exact] * 3), "rows")
+    arm = slides(side, MASS)
+    arm = replace(arm, joints=(replace(arm.joints[0], friction=Friction(5.0, 0.0)), arm.joints[1]))
+    (found,) = [f for f in judge_motion(lambda: [motion], Requirements(arm)).findings if f.kind == "effort"]
+    assert (found.joint, found.severity) == ("s1", "error")
+    assert found.value == pytest.approx(side * MASS * 1.25, rel=1e-5)

@@ -127,6 +127,7 @@ class EditedMotion:
             if column.quantity == "move":
                 continue
             half = 0.0 if column.decimals is None else 0.5 * 10.0**-column.decimals * column.factor
+            half *= half != 0.5  # as readers have it: nobody rounds to whole radians, metres or seconds
             if column.joint is None:
                 t, time = rounded(t / column.factor, column.decimals) * column.factor, half
                 continue
