@@ -48,6 +48,9 @@ def test_a_coarser_grid_says_by_how_much_its_curve_is_off(capfd: Capture) -> Non
     assert rows(outcome.out) == [[5, 0], [6, 0]]
     said = "up.csv: resampled at 1 Hz, 2 rows; the curve through them is off by at most 1 rad or m, in j1\n"
     assert outcome.err == said
+    Path("third.csv").write_text("t,q1\n0,0\n3,1\n")  # of which nine decimals leave a third of the last one
+    said = call(capfd, "resample", "third.csv", "--rate", "1").err
+    assert "4 rows; the curve through them is off by at most 3.33e-10 rad or m" in said
     for word in ("inf", "0", "nan", "1e-13"):
         assert (
             f"--rate expects rows per second, got '{word}'"
@@ -61,6 +64,17 @@ def test_motions_are_joined_in_their_order(capfd: Capture) -> None:
     assert outcome.err == "up.csv + on.csv + back.csv: joined, 6 rows from 5 s to 8 s\n"
     twice = call(capfd, "concat", "-", "on.csv", "-", stdin="t,q1\n0,0\n1,0\n")
     assert (twice.code, "standard input can be read once" in twice.err) == (2, True)
+
+
+@pytest.mark.parametrize("order", [("steady.csv", "jumps.csv"), ("jumps.csv", "steady.csv")])
+def test_a_jump_that_is_in_one_of_the_files_is_none_that_joining_makes(
+    order: tuple[str, ...], capfd: Capture
+) -> None:
+    """Velocities that are not those of the positions stand in the first file or in the second one."""
+    Path("steady.csv").write_text("t,q1,qd1\n0,0,0\n1,0,0\n", encoding="utf-8")
+    Path("jumps.csv").write_text("t,q1,qd1\n0,0,0\n1,9,0\n1.001,0,0\n2,0,0\n", encoding="utf-8")
+    outcome = call(capfd, "concat", *order)
+    assert (outcome.code, len(rows(outcome.out))) == (0, 5)
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def run_concat(options: ConcatCommand) -> int:
     found = motions[0]
     for motion in motions[1:]:
         found = join(found, motion)
-    _check_continuity(motions[0], found)
+    _check_continuity(motions[0], found, *motions[1:])
     _write(found, options)
     _say(options, f"{' + '.join(motion.rows.source for motion in motions)}: joined, {_extent(found)}")
     return 0
@@ -211,9 +211,9 @@ def _write(motion: EditedMotion, options: EditCommand) -> None:
         _say(options, f"  {note}")
 
 
-def _check_continuity(before: EditedMotion, after: EditedMotion) -> None:
-    """Refuse a motion that jumps where the one that it is made of does not."""
-    problems = new_jumps(before, after)
+def _check_continuity(before: EditedMotion, after: EditedMotion, *more: EditedMotion) -> None:
+    """Refuse a motion that jumps where those that it is made of do not."""
+    problems = new_jumps(before, after, *more)
     if problems:
         raise VerificationError(*problems)
 

@@ -91,9 +91,9 @@ def _kept(requirements: Requirements, units: Units) -> KeptLimits:
     return KeptLimits(robot, requirements, units, say)
 
 
-def new_jumps(before: EditedMotion, after: EditedMotion) -> list[Problem]:
-    """Return what is discontinuous about a motion, as it is written, and was not before."""
-    kinds = {_kind(finding) for finding in _jumps(before)}
+def new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMotion) -> list[Problem]:
+    """Return what is discontinuous about a motion, as it is written, and was not before, nor in `more`."""
+    kinds = {_kind(finding) for each in (before, *more) for finding in _jumps(each)}
     found = [finding for finding in _jumps(after.as_written()) if _kind(finding) not in kinds]
     return [finding.problem(f"{before.rows.source}: {finding.text()}") for finding in found]
 

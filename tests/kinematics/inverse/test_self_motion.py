@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from inverse_arms import arm, random_joints
-from scipy.optimize import lsq_linear
+from scipy.optimize import brentq, lsq_linear
 
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
@@ -30,7 +30,7 @@ def test_singular_is_an_arm_with_a_self_motion_and_not_one_that_is_stretched_or_
     q = random_joints(robot, rng, 6)
     q[[1, 4], 4] = 0.0, np.pi
     q[2, 2] = 0.0  # the elbow is stretched: it could go on inwards only, and the tcp with it
-    q[3, 4] = 1e-5
+    q[3, 4] = 1e-7
     found = self_motions(robot, pose_target(forward(robot, q)), q)
     assert found.singular.tolist() == [False, True, False, False, True, False]
     aligned = [False, True, True, True, False, True]
@@ -70,6 +70,35 @@ def test_what_a_target_leaves_free_is_not_singular_and_names_its_joints() -> Non
     assert found.free.all()
 
 
+def test_each_singular_configuration_has_free_joints_of_its_own() -> None:
+    """The centre of the wrist is on the first axis in one, and the axes 4 and 6 are in line in the other."""
+    robot = load_robot("irb120")
+    q = np.full((3, 6), 0.4)
+    q[2, 4] = 0.0
+
+    def radius(elbow: float) -> float:
+        """The centre is 72 mm behind the flange, by the data sheet of the maker."""
+        pose = forward(robot, np.array([0.4, 0.4, elbow, 0.4, 0.4, 0.4]))
+        x, y, _ = pose[:3, 3] - 0.072 * pose[:3, 2]
+        return float(x * np.cos(0.4) + y * np.sin(0.4))
+
+    q[1, 2] = brentq(radius, 0.5, -3.0, xtol=1e-15)
+    found = self_motions(robot, pose_target(forward(robot, q)), q)
+    assert found.singular.tolist() == [False, True, True]
+    over_shoulder, in_line = [True, False, False, True, True, True], [False, False, False, True, False, True]
+    assert found.free.tolist() == [[False] * 6, over_shoulder, in_line]
+
+
+@pytest.mark.parametrize("folded", [(0.0, 0.0), (0.0, np.pi), (np.pi, 0.0), (np.pi, np.pi)])
+def test_where_the_self_motion_of_a_folded_arm_crosses_itself_it_is_not_singular(folded) -> None:
+    """The Jacobian has rank 1 there, but beside it on each of the two branches rank 2, as everywhere."""
+    robot = arm("planar 3R")
+    q = np.array([[0.3, folded[0] - 0.3 * np.pi / 2, folded[1]]])
+    assert np.linalg.matrix_rank(jacobian(robot, q)[0, :2], tol=1e-9) == 1
+    found = self_motions(robot, partial_target(forward(robot, q)[:, :3, 3]), q, 1)
+    assert not found.singular.any()
+
+
 def one(free: list[int], *branches: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return joints (3, 6) and the same free joints in each."""
     joints = np.array([*branches, *[(9.0,) * 6] * (3 - len(branches))])
@@ -100,6 +129,8 @@ OTHER = (0.1, 0.8, 0.3, 0.4, 0.0, 1.5)
         (one([5], A, MOVED, (*MOVED[:5], 2.5)), 3, 1.4, [1]),
         (one([5], A, MOVED, (*MOVED[:5], 2.5)), 3, 2.4, [2]),
         (one([5], OTHER, A, MOVED), 3, 1.4, [0, 2]),
+        (one([5], A, (*MOVED[:4], 1e-3, 1.5)), 2, 1.4, [0, 1]),
+        (one([5], A, MOVED), 2, 1.0 + 1e-13, [0]),  # as near but for rounding
     ],
 )
 def test_of_the_points_of_one_self_motion_the_nearest_is_kept(case, valid, near, kept) -> None:
@@ -134,6 +165,26 @@ def test_answers_with_other_free_joints_are_of_other_self_motions() -> None:
     )
 
 
+def test_an_answer_of_some_targets_only_is_compared_with_others_there() -> None:
+    joints, free = one([5], A, MOVED)
+    valid = np.array([[True, True, False], [False, True, False]])
+    kept = one_per_self_motion(arm("UR"), np.stack([joints] * 2), valid, np.stack([free] * 2), None)
+    assert kept.tolist() == [[True, False, False], [False, True, False]]
+
+
+@pytest.mark.parametrize(("slide", "kept"), [(0.2, [0]), (0.2 + FULL, [0, 1])])
+def test_a_slide_knows_no_full_turns(slide, kept) -> None:
+    """6.28 m further is another place, and further away from where the arm is."""
+    joints = np.array([[(0.1, 0.2, 0.2, 0.3), (0.1, 0.2, slide, 0.9)]])
+    free, valid = np.tile(np.arange(4) == 3, (1, 2, 1)), np.ones((1, 2), dtype=bool)
+    found = one_per_self_motion(arm("SCARA"), joints, valid, free, np.array([[0.1, 0.2, 0.2, 0.4]]))
+    assert np.flatnonzero(found[0]).tolist() == kept
+    free[:] = np.arange(4) == 2
+    joints[:, :, 3] = 0.3
+    found = one_per_self_motion(arm("SCARA"), joints, valid, free, np.array([[0.1, 0.2, slide + 0.1, 0.3]]))
+    assert np.flatnonzero(found[0]).tolist() == ([0] if slide == 0.2 else [1])
+
+
 @pytest.mark.parametrize("narrow", [False, True])
 @pytest.mark.parametrize("name", ["planar 3R", "elbow, pitch and roll"])
 def test_what_is_left_of_the_way_to_the_nearest_point_is_across_the_self_motion_or_over_a_limit(
@@ -152,6 +203,10 @@ def test_what_is_left_of_the_way_to_the_nearest_point_is_across_the_self_motion_
     np.testing.assert_allclose(forward(robot, ends)[:, :3, 3], positions, rtol=0, atol=1e-9)
     turned = nearest_on_self_motions(robot, partial_target(positions), q + FULL, near)
     np.testing.assert_allclose(turned, ends, rtol=0, atol=1e-6)
+    if not narrow:
+        robot = replace(robot, limits=replace(robot.limits, position=20.0 * np.sign(bounds)))
+        turned = nearest_on_self_motions(robot, partial_target(positions), q, near + FULL)
+        np.testing.assert_allclose(turned, ends + FULL, rtol=0, atol=1e-6)
     assert (ends >= low).all()
     assert (ends <= high).all()
     held = 0
@@ -198,10 +253,12 @@ def test_each_row_stays_where_it_is_allowed_and_others_go_on() -> None:
     np.testing.assert_allclose(forward(robot, found)[:, :3, 3], target.poses[:, :3, 3], rtol=0, atol=1e-10)
 
 
-def test_what_does_not_meet_its_target_stays_where_it_is() -> None:
+@pytest.mark.parametrize("off", [[9.0, 0.0, 0.0], [0.0, 0.0, 1e-7]])
+def test_what_does_not_meet_its_target_stays_where_it_is(off) -> None:
+    """The second target is 0.1 micrometre beside the plane of the arm."""
     robot = arm("planar 3R")
     q = np.array([[0.4, 0.5, 0.6], [0.4, 0.5, 0.6]])
-    target = partial_target(forward(robot, q)[:, :3, 3] + [[9.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    target = partial_target(forward(robot, q)[:, :3, 3] + [off, [0.0, 0.0, 0.0]])
     found = nearest_on_self_motions(robot, target, q, q + 0.2)
     assert found[0].tolist() == q[0].tolist()
     assert np.abs(found[1] - q[1]).max() > 1e-2
