@@ -223,6 +223,19 @@ def test_what_is_out_of_reach_says_how_far():
     assert aside.shortfall == pytest.approx([0.0, 0.2], abs=1e-9)
 
 
+@pytest.mark.parametrize("beyond", [1e-10, 1e-8, 3e-7])
+def test_an_answer_misses_its_target_by_at_most_a_nanometre_and_a_nanoradian(beyond: float) -> None:
+    """Of an arm that is stretched out, and of a tool that is asked to point aside of its plane."""
+    robot, reach = robot_of("scorbot", None), 0.02 + 0.22 + 0.22 + 0.15
+    for part in ({"pitch": 0.0}, {"direction": [1.0, 0.0, 0.0]}, {}):
+        found = solve(robot, partial_target([reach + beyond, 0.0, 0.36], **part))
+        assert (int(found.count) > 0) == (beyond < 1e-9)
+        assert found.shortfall[0] == pytest.approx(0.0 if beyond < 1e-9 else beyond, rel=1e-3)
+    aside = [np.cos(beyond), np.sin(beyond), 0.0]
+    found = solve(robot, partial_target([0.4, 0.0, 0.3], direction=aside))
+    assert (int(found.count) > 0) == (beyond < 1e-9)
+
+
 def test_the_tool_of_no_flip_of_a_planar_arm_heads_along_up_times_axis():
     base = np.eye(4)
     base[:3, :3] = Rotation.from_euler("x", 90, degrees=True).as_matrix()  # the axes point along -y in world
