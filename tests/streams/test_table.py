@@ -56,6 +56,7 @@ def test_what_is_written_is_read(tmp_path, digits):
         "t,q1\n0,1.5\n1,-2",
         "\ufefft,q1\n0,1.5\n1,-2\n",
         "t,q1\n\n0,1.5\n\n1,-2\n\n\n",
+        "t,q1\n  \n0,1.5\n\t\n1,-2\n  \n",
         't , "q1"\n0 , 1.5\n 1,\t-2 \n',
         "# t,q1\n0,1.5\n1,-2\n",
         '"t","q1"\n"0","1.5"\n"1","-2"\n',
@@ -111,6 +112,7 @@ def test_chunks_join_without_a_seam(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
+        ("t,q1\r\n0,1\r5\r\n", [("in.csv:2:3", "q1 is '1\r5', expected a finite number")]),
         ("t,q1\n0,1\n1,abc\n", [("in.csv:3:3", "q1 is 'abc', expected a finite number")]),
         ("t,q1\n0,\n", [("in.csv:2:3", "q1 is empty, expected a finite number")]),
         ("t,q1\nnan,1\n", [("in.csv:2:1", "t is 'nan', expected a finite number")]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import isfinite
 from typing import BinaryIO, NoReturn
 
@@ -67,7 +67,7 @@ class RowReader:
         self._all = len(self._taken) == len(header.names)
         self._line = header.line + 1
         self._layout: RowLayout | None = None
-        self._texts: bytes | None = None  # of the fixed columns in the first row
+        self._texts: set[bytes] = set()  # of the fixed columns: one in a file without flaws
         self.decimals = np.zeros(len(self._taken), dtype=np.int64)
         self._fixed_form = True  # as many decimals as in the first row, until they are not
         self._first: list[int] = []
@@ -132,12 +132,16 @@ class RowReader:
         return _cells_of(buffer, lengths, width, self._taken)
 
     def _compare_texts(self, texts: bytes, count: int) -> None:
-        """Take the texts of the first row of all; NotFixedError where a later row has others."""
+        """Take the texts of some rows; NotFixedError where they are not those of all rows before."""
         if self._fixed:
-            first = texts[: len(texts) // count] if self._texts is None else self._texts
-            if texts != first * count:
+            first = texts[: len(texts) // count]
+            if texts != first * count or self._differ([first[:-1]]):
                 raise NotFixedError
-            self._texts = first
+
+    def _differ(self, texts: Iterable[bytes]) -> bool:
+        """Take texts of rows, with commas between cells; return whether there are two by now."""
+        self._texts |= {b",".join(map(bytes.strip, text.split(b","))) for text in texts}
+        return len(self._texts) > 1
 
     def _numbers_of_any_form(self, plain: bytes, written: bytes, layout: RowLayout) -> Array:
         """Return the rows of lines whose numbers are written in any form."""
@@ -151,8 +155,8 @@ class RowReader:
             rows = np.array([list(map(_number, line)) for line in cells])
         except ValueError:
             self._explain(written, layout)
-        texts = {b",".join(line[index] for index in self._fixed) for line in lines}
-        if not np.isfinite(rows).all() or len(texts) > 1:
+        texts = (b",".join(line[index] for index in self._fixed) for line in lines)
+        if not np.isfinite(rows).all() or self._differ(texts):
             self._explain(written, layout)
         shown = [max(map(decimals_of, column)) for column in zip(*cells, strict=True)]
         self.decimals = np.maximum(self.decimals, shown)
