@@ -138,6 +138,7 @@ def test_a_log_says_whose_motion_it_is_and_holds_the_job_to_the_letter() -> None
     assert json.loads(made.metadata["joint_types"]) == ["prismatic", "revolute"]
     assert float(made.metadata["duration"]) == 1.23456789
     assert made.signals == {"glue": ((0, 1.0),), "valve": ((1_234_567_890, 2.0),)}
+    assert json.loads(made.attachments[1].data)["knots"]["count"] == made.knots.times.size
     assert made.metadata["geometry"] == "none: there is no /robot_description, /tf_static, /tf, /tool_path"
 
 
