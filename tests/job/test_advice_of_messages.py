@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
+from trajcli.job.robot import load_robot
 
 
 def hint_of(move: str, more: str = "", robot: str = "ur5e") -> str:
@@ -86,3 +89,21 @@ def test_a_word_of_another_program_is_the_key_that_is_meant(move: str, meant: st
 
 def test_a_tool_has_its_word_in_the_job() -> None:
     assert hint_of("{planner: hold, duration: 1}", "tcp: {xyz: [0, 0, 0.1]}") == "did you mean 'tool'?"
+
+
+def test_flaws_of_a_robot_file_come_in_the_order_of_the_file(tmp_path: Path) -> None:
+    """Which is neither that of the model nor that of columns."""
+    path = tmp_path / "arm.yaml"
+    path.write_text(
+        "tool: {xyz: [0, 0]}\nconvention: nope\njoints: [{a: x, theta: y}]\nbase: {xyz: [1, 2]}\n"
+    )
+    with pytest.raises(InputError) as caught:
+        load_robot(path)
+    places = [problem.place for problem in caught.value.problems]
+    assert [(place.line, place.column) for place in places if place] == [
+        (1, 13),
+        (2, 13),
+        (3, 14),
+        (3, 24),
+        (4, 13),
+    ]
