@@ -136,6 +136,7 @@ def test_what_init_advises_plans_a_file_of_any_name(capfd: Capture) -> None:
     words = shlex.split(command)
     assert words[-2:] == [">", "out.csv"]
     assert call(capfd, *words[:-2], "--rate", "2").code == 0
+    assert "\x1b" not in call(capfd, "init", "a\x1b[31m.yaml").err
 
 
 def test_init_does_not_overwrite(capfd: Capture) -> None:

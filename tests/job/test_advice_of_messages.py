@@ -65,7 +65,7 @@ def test_a_word_beside_a_line_is_the_field_of_its_law(word: str, field: str) -> 
     hint = hint_of(f"{{planner: line, {TO}, {word}: 0.5}}", TCP)
     assert hint == f"`{field}` stands under `law`: write `law: {{{field}: 0.5}}`"
     whole = hint_of(f"{{planner: line, {TO}, {word}: {{a: 1, b: 2}}}}", TCP)
-    assert whole.startswith(f"`{field}` stands under `law`")
+    assert whole == f"`{field}` stands under `law`"
 
 
 KEYS = [  # a move, a point or a joint with a word of other programs, and what is meant

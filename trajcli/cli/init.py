@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
+from trajcli.cli.outcome import print_remark
 from trajcli.errors import InputError
 from trajcli.streams.whole_file import kind_of, standard_output, whole_file
 
@@ -33,5 +33,5 @@ def run_init(options: InitCommand) -> int:
         raise InputError(f"{file} exists", hint="name another file, or say --force to overwrite it")
     with whole_file(file) as out:
         out.write(text)
-    print(f"{file} written; now: trajcli plan {quote(file)} > out.csv", file=sys.stderr)  # noqa: T201
+    print_remark(f"{file} written; now: trajcli plan {quote(file)} > out.csv")
     return 0

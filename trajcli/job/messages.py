@@ -203,8 +203,6 @@ def _unknown_planner(move: object) -> tuple[str, str | None]:
     tag = move.get("planner") if isinstance(move, Mapping) else move
     if not isinstance(tag, str):
         return f"expected a planner's name, got {shown(tag)}", _every_planner()
-    if tag in HANDLING:
-        return f"{tag} is no planner", f"write `- {{{tag}: ...}}`: it stands alone between moves"
     if tag.casefold() in _PLANNERS_ELSEWHERE:
         return f"unknown planner '{tag}'", _PLANNERS_ELSEWHERE[tag.casefold()]
     meant = ALSO_CALLED.get(tag.strip().casefold().replace("-", "_").replace(" ", "_"))
