@@ -123,7 +123,8 @@ def test_init_writes_a_job_that_plans(capfd: Capture) -> None:
     assert out.startswith("t,q1_deg,")
     assert call(capfd, "plan", "job.yaml", "--strict", "--no-output").code == 0
     starter = Path("job.yaml").read_text()
-    assert call(capfd, "init", "-").out == starter
+    assert call(capfd, "init", "-") == (0, starter, "")
+    assert not Path("-").exists()
     assert {"frames", "tool", "- {repeat"} <= set(re.findall(r"^ *# (frames|tool|- \{repeat)", starter, re.M))
     uncommented = re.sub(r"^( *)# (frames|tool|- \{repeat)", r"\1\2", starter, flags=re.M)
     plan = plan_job(job_from_text(uncommented))
@@ -148,6 +149,8 @@ def test_init_does_not_overwrite(capfd: Capture) -> None:
     assert call(capfd, "init", "--force").code == 0
     assert Path("job.yaml").read_text() != "mine"
     assert call(capfd, "init", "no/folder/job.yaml").code == 4
+    Path("folder").mkdir()
+    assert "folder exists" in call(capfd, "init", "folder").err
 
 
 def test_every_command_is_on_the_page_that_the_readme_leads_to() -> None:
