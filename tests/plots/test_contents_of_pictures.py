@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.job.read import job_from_text
 from trajcli.judge.judgement import Judgement
 from trajcli.planning.plan import Plan, plan_job
+from trajcli.plots.display_units import DisplayUnits
 from trajcli.plots.panel import Panel, Picture
-from trajcli.plots.picture import picture_of
+from trajcli.plots.picture import _phase_panel, picture_of
 from trajcli.streams.table import Table
+from trajcli.units import Units
 
 GEOMETRY = "convention: standard, joints: [{a: 0.5, velocity: 9}, {a: 0.3, velocity: 9}]"
 LINK = "{a: 0.5, velocity: 9, link: {mass: 1, com: [0, 0, 0], inertia: [1, 1, 1, 0, 0, 0]}}"
@@ -204,3 +209,113 @@ def test_the_tool_is_drawn_where_it_is_limited_led_or_flies_by(
     plan = plan_of(*moves, robot=robot, more=more)
     assert (plan.flyby is not None) == ("zone" in more)
     assert shown(picture_of(plan)) & {"speed", "path"} == has
+
+
+def test_a_phase_plane_has_its_limit_from_both_sides_and_its_law_with_every_break() -> None:
+    """A law s = t^2 that is slower than the limits, which fall from 8 to 6 at s = 1, where it must not stop, but at 2.25."""
+
+    class Plane:
+        law = PiecewisePolynomial(
+            np.array([0.0, 0.7, 1.5]), np.array([[[1.0], [1.0]], [[0.0], [1.4]], [[0.0], [0.49]]])
+        )
+        breaks, stops, dimension = np.array([0.0, 1.0, 2.25]), np.array([1.0]), "length"
+
+        def largest_speed(self, s: np.ndarray, side: str = "right") -> np.ndarray:
+            high = s < 1 if side == "right" else s <= 1
+            return np.where(high, np.where(s < 0.5, np.inf, 8.0), 6.0)
+
+    planned = SimpleNamespace(phase_plane=Plane())
+    move = SimpleNamespace(index=4, planner=SimpleNamespace(tag="line"), planned=planned)
+    panel = _phase_panel(move, DisplayUnits(("a",), ("revolute",), Units("deg", "mm")))  # type: ignore[arg-type]
+    assert (panel.title, panel.x_label, panel.y_label) == (
+        "move 4 line: phase plane",
+        "s [mm]",
+        f"{SD} [mm/s]",
+    )
+    (trace,), (limit,) = panel.traces, panel.limits
+    assert (trace.x[0], trace.x[-1]) == pytest.approx((0, 2250))
+    assert np.abs(trace.x - 490).min() < 1e-9
+    np.testing.assert_allclose(trace.y, 2 * np.sqrt(1000 * trace.x), atol=1e-9)
+    assert (np.diff(limit[:, 0]) >= 0).all()
+    assert (limit[0, 0], limit[-1, 0]) == pytest.approx((0, 2250))
+    assert limit[limit[:, 0] == 1000][:, 1].tolist() == [8000, 0, 6000]
+    assert np.isnan(limit[limit[:, 0] < 499, 1]).all()
+    assert {*limit[(limit[:, 0] > 501) & (limit[:, 0] < 1000), 1]} == {8000}
+    assert {*limit[limit[:, 0] > 1000, 1]} == {6000}
+
+
+def arm_of(count: int) -> Plan:
+    robot = f"joints: [{', '.join(['{velocity: 9}'] * count)}]"
+    head = f"version: 1\nrobot: {{{robot}}}\nstart: {{joints: 0}}\nmoves: [{{planner: cubic, to: {{joints: 1}}, duration: 1}}]\n"
+    return plan_job(job_from_text(head))
+
+
+def test_panels_stand_by_joints_and_quantities() -> None:
+    (two,) = picture_of(arm_of(2), quantities=["q", "qd"]).blocks
+    named = ["j1: position", "j2: position", "j1: velocity", "j2: velocity"]
+    assert ([panel.title for panel in two.panels], two.columns, two.headings) == (named, 2, ())
+    (three,) = picture_of(arm_of(3), quantities=["q", "qd"]).blocks
+    assert [panel.title for panel in three.panels] == ["j1", "j1", "j2", "j2", "j3", "j3"]
+    assert [panel.y_label[:2].strip() for panel in three.panels] == ["q", QD] * 3
+    assert (three.columns, three.headings) == (2, ("position", "velocity"))
+    (one,) = picture_of(arm_of(4), quantities=["qd"]).blocks
+    assert [panel.title for panel in one.panels] == ["j1", "j2", "j3", "j4"]
+    assert set(one.headings) == {"velocity"}
+    assert len(one.headings) == one.columns > 1
+
+
+def test_marks_are_those_of_their_joint_and_stand_at_positions_alone() -> None:
+    spline = "planner: spline, through: [{joints: [0.1, 0.5]}], to: {joints: [0.2, 0.9]}, duration: 2"
+    found = panels(picture_of(plan_of(spline), quantities=["q", "qd"]))
+    for joint, values in (("j1", [0, 0.1, 0.2]), ("j2", [0, 0.5, 0.9])):
+        at = found[f"{joint}: position"]
+        assert {0.1 * round(10 * value) for value in values} <= {*np.round(at.waypoints[:, 1], 9)} | {0.0}
+        assert at.waypoints[:, 1].max() == pytest.approx(values[-1])
+        assert len(at.virtual_points) == 2
+        assert values[0] < at.virtual_points[0, 1] < values[1] < at.virtual_points[1, 1] < values[2]
+        assert not found[f"{joint}: velocity"].waypoints.size
+        assert not found[f"{joint}: velocity"].virtual_points.size
+
+
+@pytest.mark.parametrize(("velocity", "unlimited"), [("9", False), ("[-9, 9]", False), ("null", True)])
+def test_a_panel_without_any_limit_says_so(velocity: str, unlimited: bool) -> None:
+    plan = plan_of(
+        CUBIC, move("cubic", [0, 0], "duration: 1"), robot=f"joints: [{{velocity: {velocity}}}, {{}}]"
+    )
+    found = panels(picture_of(plan, quantities=["qd"]))
+    assert [found[f"j{k}: velocity"].unlimited for k in (1, 2)] == [unlimited, True]
+    # where one move has a limit, the panel has one
+    limited = plan_of(CUBIC, move("cubic", [0, 0], "duration: 1, limits: {velocity: 8}"), robot="joints: 2")
+    assert not any(panel.unlimited for panel in panels(picture_of(limited, quantities=["qd"])).values())
+    files = panels(picture_of(None, [table("a.csv", "q1,qd1")]))
+    assert not any(panel.unlimited for panel in files.values())
+
+
+def test_speeds_of_the_tool_have_their_limits_findings_and_files() -> None:
+    """In the files both joints turn at 0.5 and at 1 rad/s, 0.8 m and 0.3 m from the tool."""
+    spins = "planner: cubic, to: {joints: [0.2, 0.4]}, duration: 0.6"
+    plan = plan_of(
+        spins,
+        "planner: hold, duration: 1",
+        robot=GEOMETRY,
+        more="limits: {tcp: {angular_speed: 7}}\n",
+    )
+    files = [table(name, "q1,q2,qd1,qd2", 0, 0, rate, rate) for name, rate in (("a.csv", 0.5), ("b.csv", 1))]
+    error = Finding("tool_angular_speed", value=1.25, limit=1.0, time=0.5)
+    other = Finding("tool_speed", value=2.5, limit=1.0, time=0.75)
+    judged = [Judgement((error, other), "linear", 3), None]
+    picture = picture_of(plan, files, ["tool", "path"], judgements=judged)
+    found = panels(picture)
+    speed, angular = found["speed of the tool"], found["angular speed of the tool"]
+    assert [trace.source for trace in speed.traces] == [trace.source for trace in angular.traces] == [0, 1, 2]
+    assert [trace.y[0] for trace in speed.traces[1:]] == pytest.approx([0.55, 1.1])
+    assert [trace.y[0] for trace in angular.traces[1:]] == pytest.approx([1, 2])
+    assert (speed.unlimited, angular.unlimited) == (True, False)
+    assert {*angular.limits[0][:, 1]} == {7.0}
+    for panel, time, value in ((speed, 0.75, 2.5), (angular, 0.5, 1.25)):
+        assert [row for row in panel.findings.tolist() if np.isfinite(row[1])] == [[time, value]]
+    assert picture.blocks[-1].columns == 2
+    assert picture.views is not None
+    assert [source for source, _ in picture.views.traces] == [0, 1, 2]
+    assert picture.views.traces[2][1][0] == pytest.approx([0.8, 0, 0])
+    assert len(picture.views.waypoints) > 0
