@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
+import os
+import pty
+import struct
+import termios
 from contextlib import suppress
 
 import pytest
@@ -119,3 +124,19 @@ def test_a_listener_is_gone_where_its_work_has_failed() -> None:
         raise ValueError
     report_progress("behind")
     assert texts == ["work"]
+
+
+@pytest.mark.parametrize(("columns", "shows"), [(50, 49), (200, 100), (0, 79)])
+def test_a_line_is_no_wider_than_its_terminal(columns: int, shows: int, clock: Clock) -> None:
+    """What wraps is not erased; a terminal without columns has not said how many."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
+    clock.looks = 1
+    with os.fdopen(theirs, "w") as stream:
+        line = ProgressLine(stream)
+        line.show("x" * 95)
+        with line:
+            pass
+        text = os.read(ours, 1000).decode()
+    os.close(ours)
+    assert text.split("\r\x1b[2K")[1] == f"{'x' * 95}, 1 s"[:shows]

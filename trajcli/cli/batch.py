@@ -16,7 +16,7 @@ from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
 from trajcli.batches.task import BatchSetup, JobOutcome, OutcomeName, Setup, Task
 from trajcli.cli.frames import problem_as_json
 from trajcli.cli.outcome import ErrorForm, print_remark, report_error
-from trajcli.cli.progress import ERASE, WIDTH, is_terminal
+from trajcli.cli.progress import ERASE, fitting, is_terminal
 from trajcli.errors import FileError, InputError, PlanningError, TrajcliError, VerificationError, utf8
 from trajcli.streams.whole_file import standard_output
 
@@ -232,7 +232,7 @@ class Progress:
         """Write the line anew."""
         if self._shows:
             line = f"{self._done.total()} of {self.total} {self._one}s: {self.text}".replace(": ,", ",")
-            sys.stderr.write(f"{ERASE}{line[:WIDTH]}")
+            sys.stderr.write(f"{ERASE}{fitting(line, sys.stderr)}")
             sys.stderr.flush()
             self._visible = True
 

@@ -15,7 +15,6 @@ from trajcli.progress import listening
 _QUIET = 1.0  # s: work that is done by then shows nothing
 _PERIOD = 0.2  # s between two looks at what is under way
 ERASE = "\r\x1b[2K"
-WIDTH = 79  # columns: a longer line would wrap, and could not be erased
 
 
 @contextmanager
@@ -40,6 +39,14 @@ def is_terminal(stream: TextIO | None) -> bool:
         return stream is not None and stream.isatty() and os.environ.get("TERM") != "dumb"
     except ValueError:  # it is closed
         return False
+
+
+def fitting(text: str, stream: TextIO) -> str:
+    """Return what of a line a terminal shows in one: what wraps could not be erased."""
+    width = 80
+    with suppress(OSError, ValueError):
+        width = os.get_terminal_size(stream.fileno()).columns or width
+    return text[: width - 1]
 
 
 class ProgressLine:
@@ -76,7 +83,7 @@ class ProgressLine:
         wait = self._quiet
         while not self._done.wait(wait):
             text = f"{self._text}, {monotonic() - self._begun:.0f} s".removeprefix(", ")
-            self._write(f"{ERASE}{text[:WIDTH]}")
+            self._write(f"{ERASE}{fitting(text, self._stream)}")
             self._shown, wait = True, self._period
 
     def _write(self, text: str) -> None:
