@@ -46,11 +46,12 @@ def _screen(monkeypatch: pytest.MonkeyPatch) -> None:
         ("a: satisfied", f"a: {GREEN}satisfied{RESET}"),
         ("a: within rounding", f"a: {GREEN}within rounding{RESET}"),
         ("a: exceeded by a verified one", f"a: {RED}exceeded{RESET} by a verified one"),
-        ("2 failed", f"2 {RED}failed{RESET}"),
-        ("unverified", "unverified"),
+        ("a: verified; b: failed", f"a: {GREEN}verified{RESET}; b: {RED}failed{RESET}"),
+        ("not-verified.csv: satisfied", f"not-verified.csv: {GREEN}satisfied{RESET}"),
+        ("a: unverified", "a: unverified"),
     ],
 )
-def test_the_first_verdict_is_red_where_something_is_wrong(line: str, painted_line: str) -> None:
+def test_a_verdict_is_red_where_something_is_wrong_and_a_name_is_none(line: str, painted_line: str) -> None:
     assert with_verdict(line, Terminal()) == painted_line
     assert with_verdict(line, io.StringIO()) == line
 

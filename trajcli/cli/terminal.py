@@ -22,7 +22,7 @@ _MOST_ROWS = 10
 _LEAST = 16  # characters of what is shortened
 _FULL = 0.9995  # of a limit: what is shown as all of it
 _VERDICT = re.compile(
-    r"\b(?:(?P<bad>not verified|exceeded|failed)|(?P<good>verified|satisfied|within rounding))\b"
+    r"(?<=: )(?:(?P<bad>not verified|exceeded|failed)|(?P<good>verified|satisfied|within rounding))\b"
 )
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
@@ -47,8 +47,8 @@ def painted(text: str, code: str, stream: TextIO | None) -> str:
 
 
 def with_verdict(text: str, stream: TextIO | None) -> str:
-    """Return a line whose first verdict has its colour: red for what is wrong, else green."""
-    return _VERDICT.sub(lambda m: painted(m[0], RED if m["bad"] else GREEN, stream), text, count=1)
+    """Return a line whose verdicts, behind their names, have a colour: red for what is wrong, else green."""
+    return _VERDICT.sub(lambda m: painted(m[0], RED if m["bad"] else GREEN, stream), text)
 
 
 def wrapped(text: str, stream: TextIO | None) -> str:
