@@ -7,10 +7,13 @@ import io
 import os
 import pty
 import struct
+import subprocess
 import termios
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
+from running import FAST, warm
 
 from trajcli.cli import progress as shown
 from trajcli.cli.progress import ProgressLine, progress
@@ -126,17 +129,34 @@ def test_a_listener_is_gone_where_its_work_has_failed() -> None:
     assert texts == ["work"]
 
 
-@pytest.mark.parametrize(("columns", "shows"), [(50, 49), (200, 100), (0, 79)])
-def test_a_line_is_no_wider_than_its_terminal(columns: int, shows: int, clock: Clock) -> None:
-    """What wraps is not erased; a terminal without columns has not said how many."""
+@pytest.mark.parametrize(("said", "shows"), [("50", 49), ("200", 100), ("3", 39)])
+def test_a_line_is_no_wider_than_its_terminal(
+    said: str, shows: int, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What wraps is not erased."""
+    monkeypatch.setenv("COLUMNS", said)
+    clock.looks, stream = 1, Terminal()
+    line = ProgressLine(stream)
+    line.show("x" * 95)
+    with line:
+        pass
+    assert stream.getvalue().split("\r\x1b[2K")[1] == f"{'x' * 95}, 1 s"[:shows]
+
+
+@pytest.mark.parametrize(("said", "width"), [(60, 60), (0, 80), (120, 120)])
+def test_where_rows_go_elsewhere_lines_are_as_wide_as_standard_error(
+    said: int, width: int, tmp_path: Path
+) -> None:
+    """A terminal of no columns has not said how many."""
+    (tmp_path / "fast.yaml").write_text(FAST.replace("quintic", "quintic, label: " + "word " * 30))
     ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
-    clock.looks = 1
-    with os.fdopen(theirs, "w") as stream:
-        line = ProgressLine(stream)
-        line.show("x" * 95)
-        with line:
-            pass
-        text = os.read(ours, 1000).decode()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, said, 0, 0))
+    command = [*warm(), "plan", str(tmp_path / "fast.yaml"), "--no-output"]
+    environment = {**os.environ, "TERM": "xterm", "COLUMNS": "", "NO_COLOR": "1"}
+    subprocess.run(command, stdout=subprocess.PIPE, stderr=theirs, env=environment, check=False)
+    os.close(theirs)
+    text = os.read(ours, 10_000).decode()
     os.close(ours)
-    assert text.split("\r\x1b[2K")[1] == f"{'x' * 95}, 1 s"[:shows]
+    lines = [line for line in text.splitlines() if "word" in line and "/" not in line]
+    assert len(lines) > 1
+    assert max(map(len, lines)) == pytest.approx(width - 2.5, abs=2.5)  # a word has four letters

@@ -16,7 +16,7 @@ from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
 from trajcli.batches.task import BatchSetup, JobOutcome, OutcomeName, Setup, Task
 from trajcli.cli.frames import problem_as_json
 from trajcli.cli.outcome import ErrorForm, print_remark, report_error
-from trajcli.cli.progress import ERASE, fitting, is_terminal
+from trajcli.cli.progress import ERASE, columns, is_terminal
 from trajcli.errors import FileError, InputError, PlanningError, TrajcliError, VerificationError, utf8
 from trajcli.streams.whole_file import standard_output
 
@@ -145,7 +145,7 @@ def _print_outcomes(
 def _in_words(outcome: JobOutcome, progress: Progress) -> str:
     """Return an outcome as a line of a terminal: its word with a colour, the job, how long its motion is."""
     from trajcli.cli.frames import shown
-    from trajcli.cli.terminal import GREEN, RED, columns, painted, shortened
+    from trajcli.cli.terminal import GREEN, RED, painted, shortened
 
     lasts = "" if outcome.duration is None else f"{outcome.duration:.6g} s"
     word = f"{outcome.outcome:{progress.widest}}"
@@ -232,7 +232,7 @@ class Progress:
         """Write the line anew."""
         if self._shows:
             line = f"{self._done.total()} of {self.total} {self._one}s: {self.text}".replace(": ,", ",")
-            sys.stderr.write(f"{ERASE}{fitting(line, sys.stderr)}")
+            sys.stderr.write(f"{ERASE}{line[: columns() - 1]}")
             sys.stderr.flush()
             self._visible = True
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any, Literal, TextIO
 
-from trajcli.cli.progress import is_terminal
+from trajcli.cli.progress import columns, is_terminal
 from trajcli.errors import LONGEST_LINE, Problem, TrajcliError
 
 ErrorForm = Literal["text", "json", "github", "junit", "sarif"]
@@ -61,7 +61,7 @@ def report_error(error: TrajcliError, form: ErrorForm = "text") -> None:
         print(render_annotations(annotations_of(error), form), end="", file=sys.stderr)  # noqa: T201
         return
     from trajcli.cli.frames import render_problem
-    from trajcli.cli.terminal import columns, is_coloured
+    from trajcli.cli.terminal import is_coloured
 
     color, width = is_coloured(sys.stderr), columns() if is_terminal(sys.stderr) else None
     for problem in error.problems:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,6 +15,7 @@ from trajcli.progress import listening
 
 _QUIET = 1.0  # s: work that is done by then shows nothing
 _PERIOD = 0.2  # s between two looks at what is under way
+_NARROW = 40  # columns: a terminal that says less is taken for one of so many
 ERASE = "\r\x1b[2K"
 
 
@@ -41,12 +43,12 @@ def is_terminal(stream: TextIO | None) -> bool:
         return False
 
 
-def fitting(text: str, stream: TextIO) -> str:
-    """Return what of a line a terminal shows in one: what wraps could not be erased."""
-    width = 80
-    with suppress(OSError, ValueError):
-        width = os.get_terminal_size(stream.fileno()).columns or width
-    return text[: width - 1]
+def columns() -> int:
+    """Return how many columns the terminal has: that of standard error where rows go elsewhere."""
+    aside = 80
+    with suppress(OSError):
+        aside = os.get_terminal_size(2).columns or aside
+    return max(shutil.get_terminal_size((aside, 24)).columns, _NARROW)
 
 
 class ProgressLine:
@@ -83,7 +85,7 @@ class ProgressLine:
         wait = self._quiet
         while not self._done.wait(wait):
             text = f"{self._text}, {monotonic() - self._begun:.0f} s".removeprefix(", ")
-            self._write(f"{ERASE}{fitting(text, self._stream)}")
+            self._write(f"{ERASE}{text[: columns() - 1]}")
             self._shown, wait = True, self._period
 
     def _write(self, text: str) -> None:

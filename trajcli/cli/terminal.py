@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TextIO
 
 from trajcli.cli.frames import folded, shown
 from trajcli.cli.numbers import table_lines
-from trajcli.cli.progress import is_terminal
+from trajcli.cli.progress import columns, is_terminal
 
 if TYPE_CHECKING:
     from trajcli.planning.plan import Plan
 
 BOLD, RED, GREEN, YELLOW = "1", "1;31", "1;32", "33"
-_NARROW = 40  # columns: a terminal that says less is taken for one of so many
 _MOST_ROWS = 10
 _LEAST = 16  # characters of what is shortened
 _FULL = 0.9995  # of a limit: what is shown as all of it
@@ -34,11 +32,6 @@ def is_coloured(stream: TextIO | None) -> bool:
     if os.environ.get("FORCE_COLOR"):
         return True
     return is_terminal(stream)
-
-
-def columns() -> int:
-    """Return how many columns the terminal has."""
-    return max(shutil.get_terminal_size().columns, _NARROW)
 
 
 def painted(text: str, code: str, stream: TextIO | None) -> str:
