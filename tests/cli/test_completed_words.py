@@ -8,7 +8,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from typer.main import get_command
 
+from trajcli.cli.app import app
 from trajcli.cli.completion import joints_that_begin, paths_that_begin, quantities_that_begin
 from trajcli.cli.options import profile_words, quantity_names, robot_names
 from trajcli.job.schema import schema_of
@@ -124,3 +126,25 @@ def test_names_of_robots_and_consumers_are_those_that_begin_so() -> None:
     assert profile_words("jtc") == []
     assert robot_names("r5e") == []
     assert robot_names("ur5") == ["ur5", "ur5e"]
+
+
+@pytest.mark.parametrize(
+    ("command", "field", "begun", "offered"),
+    [
+        ("profiles", "name", "ur", ["ur-passthrough", "ur-servoj"]),
+        *((name, "consumer", "ros", ["ros-jtc"]) for name in ("plan", "batch")),
+        ("check", "profile", "ros", ["ros-jtc"]),
+        *((name, "robot", "ur5", ["ur5", "ur5e"]) for name in ("check", "retime", "convert", "fk", "ik")),
+        ("plot", "quantities", "pa", ["path"]),
+        ("plot", "joints", "ti", ["tilt"]),
+        *((name, "override", "moves.1.du", ["moves.1.duration="]) for name in ("plan", "check", "view")),
+        ("sweep", "vary", "moves.1.du", ["moves.1.duration="]),
+    ],
+)
+def test_each_option_offers_its_words(
+    command: str, field: str, begun: str, offered: list[str], job: str
+) -> None:
+    one = get_command(app).commands[command]  # type: ignore[attr-defined]
+    (param,) = (param for param in one.params if param.name == field)
+    found = param.shell_complete(line(job), begun)
+    assert [getattr(item, "value", item) for item in found] == offered
