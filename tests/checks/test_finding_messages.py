@@ -95,7 +95,7 @@ def test_a_slide_is_measured_in_metres() -> None:
             2,
             "acceleration_jump",
             "the acceleration of j1 jumps by 0.25 rad/s^2 at t = 0 s",
-            "use jerk_limited or quintic, or say limits: {jerk: null}",
+            "use jerk_limited or quintic, or say limits: {jerk: null} in the job",
         ),
     ],
 )

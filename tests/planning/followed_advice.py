@@ -222,7 +222,7 @@ HINTS: tuple[Rule, ...] = (
     (rf"it must last {NUMBER} times longer \({NUMBER} s(?:: `(\w+): {NUMBER}`( under `law`)?)?\)", _last),
     (r"(?<!with )say `when_over_limit: slow`", _slow),
     (rf"(?:use |or )({PLANNER})", _use),
-    (r"say limits: \{jerk: null\}( in the job and leave `jerk` out)?", _no_jerk),
+    (r"say limits: \{jerk: null\} in the job( and leave `jerk` out)?", _no_jerk),
     (r"say `synchronize: (\w+)`", lambda job, move, c, m: move.update(synchronize=m[1])),
     (r"say `overshoot: true`", _set("overshoot", value=True)),
     (r"say `end_blends: (\w+)`", lambda job, move, c, m: move.update(end_blends=m[1])),

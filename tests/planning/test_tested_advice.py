@@ -88,18 +88,22 @@ def test_beside_a_position_that_no_time_mends_slowing_alone_is_not_advised(*, sl
 def test_steps_are_told_what_has_none_and_keeps_the_limits_in_the_same_time() -> None:
     """A quintic of 3 s keeps them, one of 0.3 s does not: then jerk_limited alone, which finds its time."""
     assert hints(planned(JERK, to("cubic", duration=3))) == {
-        "acceleration_jump": "use jerk_limited or quintic, or say limits: {jerk: null}"
+        "acceleration_jump": "use jerk_limited or quintic, or say limits: {jerk: null} in the job"
     }
     told = hints(planned(JERK, to("cubic", duration=0.3)))
-    assert told["acceleration_jump"] == told["jerk"] == "use jerk_limited, or say limits: {jerk: null}"
+    assert (
+        told["acceleration_jump"]
+        == told["jerk"]
+        == "use jerk_limited, or say limits: {jerk: null} in the job"
+    )
     # sqrt(6 D / (a T^2)) = 2.88675..., rounded up; as the steps stay, slowing is no way out of all
     assert told["velocity"] == told["acceleration"] == "it must last 2.88676 times longer (0.866026 s)"
 
 
 def test_a_limit_of_jerk_of_the_move_itself_is_named() -> None:
     plan = planned({"velocity": 2, "acceleration": 8}, to("cubic", duration=3, limits={"jerk": 50}))
-    own = " in the job and leave `jerk` out of the move's own"
-    hint = f"use jerk_limited or quintic, or say limits: {{jerk: null}}{own}"
+    own = " and leave `jerk` out of the move's own"
+    hint = f"use jerk_limited or quintic, or say limits: {{jerk: null}} in the job{own}"
     assert hints(plan) == {"acceleration_jump": hint}
 
 
@@ -118,7 +122,7 @@ def test_no_move_loses_the_limit_of_jerk_without_which_it_cannot_be_planned(
     assert "quintic" in hint
     assert "null" not in hint
     free = hints(planned(limits, to("cubic", duration=3)))["acceleration_jump"] or ""
-    assert free.endswith("or say limits: {jerk: null}")
+    assert free.endswith("or say limits: {jerk: null} in the job")
 
 
 @pytest.mark.parametrize("before", [0, 1])
@@ -136,7 +140,7 @@ def test_a_step_where_two_moves_meet_is_advised_for_either(before: int) -> None:
         },
     ]
     meeting, own = "let the moves meet without acceleration, or ", "use jerk_limited or quintic"
-    free = ", or say limits: {jerk: null}"
+    free = ", or say limits: {jerk: null} in the job"
     plan = planned(JERK, *moves)
     assert hints(plan, before) == {"acceleration_jump": f"{meeting}{own} for move {before + 1}{free}"}
     assert hints(plan, before + 1) == {"acceleration_jump": f"{own}{free}"}

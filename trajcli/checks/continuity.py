@@ -21,7 +21,7 @@ from trajcli.limits.joints import numbered, peaks_by_move
 from trajcli.limits.tolerances import allowed_jump
 from trajcli.trajectory import Trajectory
 
-JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null}"
+JERK_HINT = "use jerk_limited or quintic, or say limits: {jerk: null} in the job"
 _BLOCK = 16_384  # breaks looked at together: what is computed of them takes some MB
 _SAME = 1e-12  # jumps that differ by less than this part are equal: the earliest is named
 _QUANTITIES = ("position", "velocity", "acceleration")

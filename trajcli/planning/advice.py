@@ -184,7 +184,7 @@ def _without_jerk_limit(move: PlannedMove, moves: Sequence[PlannedMove]) -> Iter
         followed = other.duration > 0 and (other.planner.follows_jerk or other.planner.finds_duration)
         if followed and _planned(other, other.planner, replace(other.robot, limits=free)) is None:
             return
-    yield "say limits: {jerk: null}" + (" in the job and leave `jerk` out of the move's own" if own else "")
+    yield "say limits: {jerk: null} in the job" + (" and leave `jerk` out of the move's own" if own else "")
 
 
 def unit_hint(loaded: LoadedJob) -> str | None:

@@ -65,7 +65,9 @@ _WHOLE = (True, True, True)
 _ALL_SIX = 6
 _UPRIGHT = 1e-6  # rad from upright
 _SAME = 1e-9  # of an entry of a matrix: two orientations that are meant to be one
-REMEDIES = {"acceleration_jump": "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null}"}
+REMEDIES = {
+    "acceleration_jump": "use `law: {shape: quintic}` or jerk_limited, or say limits: {jerk: null} in the job"
+}
 _ARRIVED = 1e-5  # rad or m: joint values that are given, and reached on the path
 
 

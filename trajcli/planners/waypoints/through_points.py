@@ -58,7 +58,7 @@ class PointTable:
 
 REMEDIES = {
     "acceleration_jump": (
-        "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null}"
+        "use spline with rule continuous_acceleration or quintic, or say limits: {jerk: null} in the job"
     )
 }
 OPEN_END_REMEDIES = {
