@@ -16,7 +16,7 @@ from trajcli.editing.writing import write_motion
 from trajcli.errors import InputError
 from trajcli.grids import UniformGrid
 from trajcli.job.read import job_from_text
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
 from trajcli.streams.reading import read_table

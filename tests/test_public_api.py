@@ -62,6 +62,31 @@ def test_writing_a_plan(tmp_path: Path) -> None:
     assert (tmp_path / "rows.csv").read_bytes() == golden.read_bytes()
 
 
+def test_a_log_has_the_report_that_the_command_writes(tmp_path: Path) -> None:
+    """With the event of rows that pass a limit between them, whichever way the file is written."""
+    from mcap.reader import make_reader
+
+    from trajcli.cli.app import app
+
+    job, paths = (
+        EXAMPLES / "sync.yaml",
+        [tmp_path / f"{name}.mcap" for name in ("function", "method", "command")],
+    )
+    trajcli.write_plan(trajcli.plan_job(trajcli.load_job(job)), str(paths[0]))
+    trajcli.plan(job).save(paths[1])
+    with pytest.raises(SystemExit, match="0"):
+        app(["plan", str(job), "-q", "-o", str(paths[2])])
+    said = set()
+    for path in paths:
+        with path.open("rb") as stream:
+            (report,) = [
+                each.data for each in make_reader(stream).iter_attachments() if "report" in each.name
+            ]
+        said.add(report)
+    assert len(said) == 1
+    assert b"joined_over_limit" in report
+
+
 def test_a_plan_that_breaks_a_limit_is_not_written(tmp_path: Path) -> None:
     loaded = trajcli.job_from_text("""
 version: 1

@@ -18,7 +18,7 @@ from trajcli.geometry.rotation import without_jumps
 from trajcli.grids import ListedGrid, UniformGrid
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import plan_job
 from trajcli.samples import sample
 from trajcli.streams.table import read_csv

@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from trajcli.job.schema import schema_of
     from trajcli.judge.judgement import Judgement
     from trajcli.kinematics.robot import Joint, Limits, Robot
+    from trajcli.output.delivery.joined import write_plan
     from trajcli.output.report import report_of, verification_error
-    from trajcli.output.write import write_plan
     from trajcli.planning.plan import Plan, plan_job
     from trajcli.trajectory import Rows, State, Trajectory
     from trajcli.version import __version__
@@ -73,8 +73,8 @@ _HOMES = {
     "trajcli.kinematics.robot": ("Joint", "Limits", "Robot"),
     "trajcli.api.motions": ("Motion", "batch", "plot", "resample", "retime", "sweep", "view"),
     "trajcli.planning.plan": ("Plan", "plan_job"),
+    "trajcli.output.delivery.joined": ("write_plan",),
     "trajcli.output.report": ("report_of", "verification_error"),
-    "trajcli.output.write": ("write_plan",),
     "trajcli.trajectory": ("Rows", "State", "Trajectory"),
     "trajcli.version": ("__version__",),
 }

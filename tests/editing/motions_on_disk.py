@@ -8,7 +8,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.job.read import job_from_text
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import plan_job
 
 JOB = """\

@@ -12,7 +12,7 @@ from trajcli.editing.operations import cut, join, resample, reverse
 from trajcli.editing.writing import write_motion
 from trajcli.job.read import job_from_text
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.units import Units
 

@@ -24,7 +24,7 @@ from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.motion import Requirements
 from trajcli.judge.recorded_tool import ToolJudge
 from trajcli.kinematics.robot import Robot
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import plan_job
 from trajcli.streams.decimals import Digits
 from trajcli.streams.recorded_motion import open_motion

@@ -11,7 +11,7 @@ from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import plan_job
 
 ARM = """

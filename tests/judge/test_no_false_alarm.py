@@ -16,7 +16,7 @@ from tiers import QUICK
 from trajcli.errors import TrajcliError
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planners import PLANNERS
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution

@@ -18,8 +18,8 @@ from trajcli.grids import ListedGrid
 from trajcli.job.read import job_from_text
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
+from trajcli.output.delivery.joined import write_plan
 from trajcli.output.recording import LogOptions, recording_of
-from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.player.scene import scene_of_plan
 from trajcli.plots.planned_motion import PlannedMotion

@@ -18,7 +18,7 @@ from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Payload, ToolLimits, unlimited
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import plan_job
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 from trajcli.trajectory import State

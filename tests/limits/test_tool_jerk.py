@@ -24,8 +24,8 @@ from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
 from trajcli.limits.kinds import TOOL_KINDS, LimitedMove
 from trajcli.limits.tool import ToolFamily, ToolStep, ToolSurvey, limits_tool, unjudged
 from trajcli.limits.tool_bound import ToolPeak
+from trajcli.output.delivery.joined import write_plan
 from trajcli.output.report import report_of
-from trajcli.output.write import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.trajectory import Span, State, Trajectory
 

@@ -14,7 +14,8 @@ from trajcli.errors import TrajcliError
 from trajcli.grids import KnotGrid
 from trajcli.job.read import load_job
 from trajcli.knots import knots_of
-from trajcli.output.write import grid_of, write_plan, write_rows
+from trajcli.output.delivery.joined import write_plan
+from trajcli.output.write import grid_of, write_rows
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.recorded_motion import MotionFile, open_motion
 

@@ -15,8 +15,9 @@ from streams.mcap.conftest import read_mcap
 
 from trajcli.errors import InputError, VerificationError
 from trajcli.job.read import job_from_text
+from trajcli.output.delivery.joined import write_plan
 from trajcli.output.recording import LogOptions
-from trajcli.output.write import grid_of, write_plan, write_rows
+from trajcli.output.write import grid_of, write_rows
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.formats import FORMATS
 

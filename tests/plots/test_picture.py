@@ -12,7 +12,7 @@ from planned_examples import flown_cell
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.forward import forward
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.panel import Panel, Picture
 from trajcli.plots.picture import MOST_PLANES, picture_of

@@ -11,7 +11,7 @@ import pytest
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.plots.panel import Panel, Picture
 from trajcli.plots.picture import picture_of

@@ -11,7 +11,7 @@ import yaml
 
 from trajcli.errors import FileError, InputError
 from trajcli.job.read import load_job
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.reading import holds_motion, is_job, is_ros_message, motion_files, read_table
 from trajcli.streams.ros_messages import read_ros_yaml

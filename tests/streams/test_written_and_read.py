@@ -9,7 +9,7 @@ import pytest
 
 from trajcli.job.read import load_job
 from trajcli.knots import knots_of
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.recorded_motion import open_motion
 from trajcli.units import Units

@@ -52,13 +52,11 @@ class PlannedJob(Plan):
             InputError: When the ending is that of no format, or digits are other words.
             FileError: When the file cannot be written.
         """
-        from trajcli.output.delivery.joined import as_logged
-        from trajcli.output.write import write_plan
-        from trajcli.streams.formats import format_of
+        from trajcli.output.delivery.joined import write_plan
 
         if digits not in (None, "fixed", "full"):
             raise InputError(f"expected fixed or full digits, got {digits!r}")
-        write_plan(as_logged(self, format_of(str(path))), str(path), digits or self.digits)
+        write_plan(self, str(path), digits or self.digits)
 
     def report(self) -> Report:
         """Return the report, as `trajcli plan --report` writes it beside rows as CSV."""

@@ -134,28 +134,6 @@ def _counted(blocks: Iterator[Array], count: int) -> Iterator[Array]:
         yield block
 
 
-def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") -> None:
-    """Write the rows of a plan that verifies, as `trajcli plan` does.
-
-    Args:
-        plan: The plan.
-        path: A file, whose ending names the format, and which appears whole or not at all; None or "-" is
-            standard output.
-        digits: "fixed" for nine decimals, "full" for all bits.
-
-    Raises:
-        VerificationError: When the plan breaks a limit; nothing is written.
-        InputError: When the rows that the job asks for cannot be given.
-        FileError: When the file cannot be written.
-        BrokenPipeError: When the reader has closed the pipe.
-    """
-    if not plan.verdict.passed:
-        from trajcli.output.report import verification_error
-
-        raise verification_error(plan)
-    write_rows(plan, grid_of(plan), path, digits, form=format_of(path))
-
-
 def write_text(text: str, path: str) -> None:
     """Write a text to a file, which appears whole or not at all; `-` is standard output.
 

@@ -19,7 +19,7 @@ from trajcli.geometry.rotation import quaternion_from_matrix
 from trajcli.judge.rows.tool_rows import joints_found_back
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.jacobian import jacobian_dot_qd, tcp_twist
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.row_sources import EXACT, ArrayRows
 

@@ -15,7 +15,7 @@ from trajcli.errors import InputError, PlanningError
 from trajcli.judge.rows import tool_rows
 from trajcli.judge.rows.tool_rows import ArmsOfMoves, joints_found_back
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.recorded.column_roles import NamedFile

@@ -14,7 +14,7 @@ from tiers import few
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import plan_job
 
 ENDINGS = ("csv", "jsonl", "mcap", "yaml")

@@ -12,7 +12,7 @@ from planned_examples import planned_once
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

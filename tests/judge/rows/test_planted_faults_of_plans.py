@@ -16,7 +16,7 @@ from tiers import few
 
 from trajcli.errors import InputError, TrajcliError
 from trajcli.judge.file import CheckOptions, check_file
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planners import PLANNERS
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.mcap.definitions import JOINT_STATE, definition_of

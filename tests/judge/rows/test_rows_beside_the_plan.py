@@ -19,7 +19,7 @@ from trajcli.columns import GROUPS, columns_of
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.rows import planned_rows
 from trajcli.judge.rows.planned_rows import RowComparison, compare_with_plan
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams import npy
 from trajcli.streams.byte_source import ByteSource

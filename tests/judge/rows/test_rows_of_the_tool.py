@@ -17,7 +17,7 @@ from trajcli.errors import InputError
 from trajcli.findings import Finding
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
-from trajcli.output.write import write_plan
+from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan
 
 Rows = NDArray[np.float64]

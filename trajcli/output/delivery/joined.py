@@ -14,11 +14,11 @@ from trajcli.frozen import frozen
 from trajcli.grids import Grid, UniformGrid
 from trajcli.judge.judgement import Judgement
 from trajcli.output.delivery.joined_rows import JoinedRows
-from trajcli.output.write import grid_of
+from trajcli.output.write import grid_of, write_rows
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan
 from trajcli.streams.decimals import Digits
-from trajcli.streams.formats import DEFAULT, StreamFormat
+from trajcli.streams.formats import DEFAULT, StreamFormat, format_of
 
 if TYPE_CHECKING:
     from trajcli.job.report import RowsReport
@@ -72,6 +72,29 @@ def as_logged(plan: Plan, form: StreamFormat) -> Plan:
     if form.content != "log" or not plan.verdict.passed:
         return plan
     return with_event(plan, joined_rows(plan, grid_of(plan), form), form)[0]
+
+
+def write_plan(plan: Plan, path: str | None = None, digits: Digits = "fixed") -> None:
+    """Write the rows of a plan that verifies, as `trajcli plan` does.
+
+    Args:
+        plan: The plan.
+        path: A file, whose ending names the format, and which appears whole or not at all; None or "-" is
+            standard output.
+        digits: "fixed" for nine decimals, "full" for all bits.
+
+    Raises:
+        VerificationError: When the plan breaks a limit; nothing is written.
+        InputError: When the rows that the job asks for cannot be given.
+        FileError: When the file cannot be written.
+        BrokenPipeError: When the reader has closed the pipe.
+    """
+    if not plan.verdict.passed:
+        from trajcli.output.report import verification_error
+
+        raise verification_error(plan)
+    form = format_of(path)
+    write_rows(as_logged(plan, form), grid_of(plan), path, digits, form=form)
 
 
 def rows_report(rows: JoinedRows, judged: Judgement) -> RowsReport:
