@@ -452,10 +452,7 @@ def orientation_along(
 
 
 def _even_in_angles(
-    rotations: Array,
-    targets: Sequence[ToolTarget],
-    progress: SegmentProgress | None,
-    origin: Target | None,
+    rotations: Array, targets: Sequence[ToolTarget], progress: SegmentProgress | None, origin: Target | None
 ) -> OrientationCurve:
     """Return R(s) that goes evenly in the angles in which the targets are given.
 
