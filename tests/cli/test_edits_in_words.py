@@ -156,6 +156,8 @@ def test_each_move_has_its_factor(capfd: Capture) -> None:
         ),
         ((0.5, (3,), ("velocity", "a")), "move 3: faster, factor 0.5, by the velocity of a"),
         ((1.0, None, ("jerk", "b")), "kept, factor 1, by the jerk of b"),
+        ((1 - 1e-11, None, ("jerk", "b")), "kept, factor 1, by the jerk of b"),
+        ((1 + 1e-8, None, ("jerk", "b")), "stretched, factor 1.00000001, by the jerk of b"),
     ],
 )
 def test_a_stretch_says_what_binds(

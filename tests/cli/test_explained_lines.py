@@ -103,6 +103,8 @@ def test_what_is_rounding_beside_the_largest_of_its_kind_is_not_told() -> None:
         peak("a", "jerk", -1e-11, 1e-11),
     ]
     assert len(peaks(*shaken)) == 2
+    at_rest = [peak("a", "position", 3, 3), peak("a", "velocity", 0, 1e-9)]
+    assert [len(peaks(*at_rest, tool=object(), duration=long)) for long in (0.5, 1.0, 4.0)] == [1, 1, 2]
     mixed = peaks(*moving, peak("b", "position", -1e-12, 5), peak("b", "velocity", -40, 1e-11))
     assert "-1e-12 (t = 0.25)" in mixed[2] or "0 (t = 0.25) .. 5" in mixed[2]
     assert mixed[3] == "    b qd: -40 (t = 0.25) .. 0 (t = 0.5) deg; no limit"

@@ -131,6 +131,14 @@ def test_no_line_is_wider_than_the_terminal_and_no_word_is_lost(width: int, at: 
     assert "".join(hint.split()) in "".join(text.split())
 
 
+@pytest.mark.parametrize("width", [20, 33, 80])
+def test_messages_of_wide_letters_are_folded_by_columns(width: int) -> None:
+    words = " ".join(["日本語", "a\u0301", "x" * 5] * 20)
+    rows = render_problem(Problem(words, words), color=False, width=width).split("\n")
+    assert " ".join(row.strip() for row in rows) == f"error: {words} {words}"
+    assert width - 8 < max(map(columns, rows)) <= width
+
+
 def test_a_hint_stands_beside_the_carets_where_it_fits() -> None:
     place = Place("f", 1, 1, "ab", 2)
     for hint, width, beside in (

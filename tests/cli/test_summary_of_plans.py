@@ -259,6 +259,13 @@ def test_of_limits_that_a_peer_breaks_the_worst_is_said() -> None:
     assert line == "  ruckig breaks a limit: the velocity of a reaches -3 u, its limit is -1, and 2 more"
     (line,) = violation_lines("ruckig", [*faster, broken("position", "d", 1.01, 1.0)])
     assert line == "  ruckig breaks a limit: the position of d reaches 1.01 u, its limit is 1, and 3 more"
+    of_zero = [broken("position", "d", 9.0, 1.0), broken("position", "e", -0.5, 0.0)]
+    for order in (of_zero, of_zero[::-1]):  # no unit makes -0.5 a smaller share of 0 than 9 of 1
+        (line,) = violation_lines("ruckig", order)
+        assert "position of e reaches -0.5 u" in line
+    low = [broken("position", "d", 0.5, 1.0), broken("position", "e", 1.25, 1.0)]
+    (line,) = violation_lines("ruckig", low)
+    assert "position of d reaches 0.5 u" in line
     (line,) = violation_lines("toppra", faster[1:2])
     assert line == "  toppra breaks a limit: the jerk of b reaches 500 u, its limit is 250"
     assert list(violation_lines("toppra", ())) == []

@@ -285,7 +285,8 @@ def test_the_command_for_people_and_programs(tmp_path, capsys) -> None:  # type:
     job.write_text(CARRYING.replace("MASS", "0.5"))
     assert run_payload(PayloadCommand(job=str(job), as_json=True)) == 0
     told = json.loads(capsys.readouterr().out)
-    assert list(told) == ["mass", "joint", "move", "time", "effort", "limit", "cause"]
+    assert list(told) == ["mass", "joint", "move", "time", "effort", "limit", "cause", "com", "moves"]
+    assert (told["com"], told["moves"]) == ([0.06, 0.02, 0.0], [2])
     assert (told["joint"], told["move"]) in (("a", 2), ("b", 2))
     assert run_payload(PayloadCommand(job=str(job), override=["moves.1.attach.mass=0.1"], at=2)) == 0
     first, second = capsys.readouterr().out.splitlines()

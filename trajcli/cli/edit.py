@@ -162,12 +162,13 @@ def _stretch(stretch: Stretch, say: Callable[..., str]) -> str:
     whose = f"move{'s' * (len(moves) > 1)} {', '.join(map(str, moves))}: " if moves else ""
     if stretch.binding is None:
         return f"{whose}factor 1, its limits are kept as it is"
-    how = "stretched" if stretch.factor > 1 else "faster" if stretch.factor < 1 else "kept"
+    factor = f"{stretch.factor:.9g}"
+    how = "kept" if factor == "1" else "stretched" if stretch.factor > 1 else "faster"
     limit = stretch.binding.amounts.get("limit")
     bound = "" if limit is None or isinstance(limit, str) else f", whose limit is {say(limit)}"
     of_joint = f" of {stretch.binding.joint}" if stretch.binding.joint else " of the tool"
     kind = stretch.binding.kind.removeprefix("tool_").replace("_", " ")
-    return f"{whose}{how}, factor {stretch.factor:.9g}, by the {kind}{of_joint}{bound}"
+    return f"{whose}{how}, factor {factor}, by the {kind}{of_joint}{bound}"
 
 
 def _edited(

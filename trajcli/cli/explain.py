@@ -34,7 +34,7 @@ _TIME_DECIMALS = 12
 _ROUNDING = 1e-12  # in units of the job: what is missed by less is met
 _FITTED = 1e-9  # of the largest: rates of a joint that rests, where the arm follows its tool
 _SYMBOLS = {"position": "q", "velocity": "qd", "acceleration": "qdd", "jerk": "qddd"}
-_SLOWER = {"position": "position", "velocity": "velocity", "acceleration": "velocity", "jerk": "acceleration"}
+_SLOWER = {"position": "position", "velocity": "position", "acceleration": "velocity", "jerk": "acceleration"}
 
 
 def waypoint_lines(move: ExplainedMove) -> Iterator[str]:
@@ -227,7 +227,7 @@ def _peaks(move: ExplainedMove) -> Iterator[str]:
     for peak in move.peaks:
         size = max(abs(peak.low), abs(peak.high))
         # a rate is rounding, too, where over the whole move it would hardly change what it is the rate of
-        scale = max(largest[peak.quantity], largest[_SLOWER[peak.quantity]] / (move.duration or 1.0))
+        scale = max(largest[peak.quantity], largest.get(_SLOWER[peak.quantity], 0.0) / (move.duration or 1.0))
         nothing = (_ROUNDING if move.tool is None else _FITTED) * scale
         if size <= nothing and peak.quantity != "position":
             continue

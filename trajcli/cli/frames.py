@@ -70,9 +70,10 @@ def render_problem(problem: Problem, *, color: bool, width: int | None = None) -
 
 
 def folded(text: str, width: int | None, indent: str) -> str:
-    """Return a text in lines of so many characters, broken between words; in one where no width is given."""
+    """Return a text in lines of so many columns, broken between words; in one where no width is given."""
+    original, text = text, "".join(char + "\0" * (_cell(char).width - 1) for char in text)
     if width is None or len(text) <= width:
-        return text
+        return original
     first = text[: len(text) - len(text.lstrip())]
     lines = textwrap.wrap(
         text.lstrip(),
@@ -82,7 +83,7 @@ def folded(text: str, width: int | None, indent: str) -> str:
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return "\n".join(lines)
+    return "\n".join(lines).replace("\0", "")
 
 
 def problem_as_json(problem: Problem) -> dict[str, Any]:

@@ -34,10 +34,16 @@ def run_payload(options: PayloadCommand) -> int:
         capacity = payload_capacity(loaded, options.at, planned)
     if options.as_json:
         names = ("mass", "joint", "move", "time", "effort", "limit", "cause")
-        print_json({name: getattr(capacity, name) for name in names})
+        com = None if capacity.com is None else capacity.com.tolist()
+        found = {name: getattr(capacity, name) for name in names}
+        print_json({**found, "com": com, "moves": _carrying(loaded, capacity)})
     else:
         print_lines(_lines(loaded, capacity))
     return 0
+
+
+def _carrying(loaded: LoadedJob, capacity: PayloadCapacity) -> list[int]:
+    return [k for k in capacity.moves if not loaded.job.moves[k].handles]
 
 
 def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
@@ -45,7 +51,7 @@ def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
     if capacity.com is not None:
         com = [to_user(x, Quantity("length"), loaded.units) for x in capacity.com.tolist()]
         where = f"at [{', '.join(numbers([x]) for x in com)}] {loaded.units.length} of the tcp"
-    carried = [k for k in capacity.moves if not loaded.job.moves[k].handles]
+    carried = _carrying(loaded, capacity)
     moves = f"move{'s' * (len(carried) > 1)} {', '.join(map(str, carried))}"
     if capacity.mass is None:
         yield f"any mass {where} will do in {moves}"

@@ -293,9 +293,11 @@ def violation_lines(peer: str, violations: Sequence[PeerViolation]) -> Iterator[
     """Yield the worst limit that a peer breaks, and how many more."""
     if not violations:
         return
-    worst = max(
-        violations, key=lambda one: (one.quantity == "position", abs(one.value) / (abs(one.limit) or 1))
-    )
+
+    def beyond(one: PeerViolation) -> tuple[bool, float]:
+        return one.quantity == "position", abs(one.value / one.limit - 1) if one.limit else np.inf
+
+    worst = max(violations, key=beyond)
     more = f", and {len(violations) - 1} more" if len(violations) > 1 else ""
     reached = f"{worst.value:.9g} {worst.unit}, its limit is {worst.limit:.9g}"
     yield f"  {peer} breaks a limit: the {worst.quantity} of {worst.joint} reaches {reached}{more}"

@@ -168,6 +168,7 @@ WRONG = [
         "'above' is not many itself",
         "write `repeat: slot`",
     ),
+    ('  - {repeat: "3", moves: [{call: place}]}\n', 2, "'3' is not many itself", "without quotes: 3"),
     ("  - {repeat: 0, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
     ("  - {repeat: true, moves: [{call: place}]}\n", 2, "whole number of at least 1", None),
     (

@@ -117,6 +117,9 @@ def test_times_of_a_clock_count_from_the_first(tmp_path: Path) -> None:
     unstamped = [state(0, [1.0, 2.0, 3.0]) for _ in range(3)]
     motion = read_mcap(bag(tmp_path / "b.mcap", {"/x": (STATE, unstamped)}, clock=10**18))
     assert motion.times.tolist() == [0.0, 0.01, 0.02]
+    late = bag(tmp_path / "c.mcap", {"/x": (STATE, unstamped)}, clock=2**63)
+    with pytest.raises(InputError, match=r"a message of /x is logged at 9223372036854775808 ns or later"):
+        read_mcap(late)
 
 
 def _none() -> Any:

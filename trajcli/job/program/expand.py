@@ -234,6 +234,8 @@ class _Expansion:
                 hint = did_you_mean(node.value, counts) or valid_names(counts, "names that are many")
                 if needed := self._names.needs(node.value):
                     hint = "write " + ", and within it ".join(f"`repeat: {one}`" for one in needed)
+                if node.value.isdecimal():
+                    hint = f"as a number, without quotes: {node.value}"
                 message = f"'{node.value}' is not many itself"
                 raise self._names.refused(message, path, hint or "no point of the job is a grid or a list")
         names = tuple(str(node.value) for node in listed)

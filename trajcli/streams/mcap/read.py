@@ -133,6 +133,8 @@ def _states(
                 if offsets.size:
                     series = _decoded(log, block, offsets, name, layout)
                     times = block.heads(offsets)["time"].astype(np.int64)
+                    if unstamped and times.min() < 0:
+                        raise log.wrong(f"a message of {name} is logged at {2**63} ns or later")
                     pending[name].append(replace(series, nanoseconds=times) if unstamped else series)
         yield from _paired(log.file, *pending.values())
     if any(part.nanoseconds.size for parts in pending.values() for part in parts):
