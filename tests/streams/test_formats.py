@@ -10,8 +10,19 @@ import pytest
 
 from trajcli.columns import columns_of
 from trajcli.errors import InputError, TrajcliError
+from trajcli.job.read import job_from_text
+from trajcli.knots import knots_of
+from trajcli.planning.plan import plan_job
 from trajcli.streams import formats
-from trajcli.streams.formats import DEFAULT, FORMATS, StreamFormat, WriteOptions, format_of, write_verified
+from trajcli.streams.formats import (
+    DEFAULT,
+    FORMATS,
+    Goal,
+    StreamFormat,
+    WriteOptions,
+    format_of,
+    write_verified,
+)
 from trajcli.units import Units
 
 COLUMNS = columns_of(("t", "q"), ("revolute", "prismatic"), Units("deg", "mm"))
@@ -136,3 +147,54 @@ def test_a_format_of_a_motion_is_not_written_of_a_table(name):
     columns, rows = blocks()
     with pytest.raises(TrajcliError, match="there is only a table"):
         FORMATS[name].write([rows], columns, io.BytesIO(), WriteOptions())
+
+
+@pytest.mark.parametrize("name", ["csv", "jsonl", "npy", "npz"])
+@pytest.mark.parametrize("digits", ["fixed", "full"])
+def test_rows_that_are_others_than_those_of_a_stream_are_refused(name, digits):
+    """By a decimal that is shown: with all digits by the last bits, too."""
+    columns, rows = blocks()
+    write, verify = FORMATS[name].functions(WriteOptions(digits))
+    out = io.BytesIO()
+    for _ in write([rows], columns, out):
+        pass
+    verify(io.BytesIO(out.getvalue()), [rows], columns)
+    others = rows.copy()
+    others[3, 2] += 1e-14 if digits == "full" or name != "csv" else 1e-8
+    with pytest.raises(TrajcliError):
+        verify(io.BytesIO(out.getvalue()), [others], columns)
+
+
+def test_rows_have_nine_decimals_and_units_of_the_job_in_csv_alone():
+    columns, rows = blocks()
+    out = io.BytesIO()
+    DEFAULT.write([rows], columns, out, WriteOptions())
+    assert out.getvalue().splitlines()[2] == b"0.100000000,0.142857143,0.333333333,0.111111111"
+    assert [name for name, form in FORMATS.items() if not form.si] == ["csv"]
+    contents = {name: form.content for name, form in FORMATS.items() if form.content != "rows"}
+    assert contents == {"mcap": "log", "ros": "knots", "ros-goal": "knots"}
+    assert [name for name, form in FORMATS.items() if not form.text] == ["mcap", "npy", "npz"]
+
+
+def motion(target=1.0, orders=3):
+    """Return options for the motion of a joint to a target."""
+    move = f"{{planner: quintic, to: {{joints: {target}}}, duration: 1}}"
+    plan = plan_job(job_from_text(f"version: 1\nrobot: {{joints: 1}}\nstart: {{joints: 0}}\nmoves: [{move}]"))
+    return WriteOptions(goal=lambda: Goal(("j",), knots_of(plan.trajectory), orders))
+
+
+@pytest.mark.parametrize(("name", "begins"), [("ros", b"joint_names:"), ("ros-goal", b"trajectory:")])
+def test_a_message_is_that_of_its_name_and_states_so_many_orders_and_is_compared(name, begins):
+    columns, rows = blocks()
+    for orders, stated in ((1, (False, False)), (2, (True, False)), (3, (True, True))):
+        write, verify = FORMATS[name].functions(motion(orders=orders))
+        out = io.BytesIO()
+        assert [block.tolist() for block in write([rows], columns, out)] == [rows.tolist()]
+        text = out.getvalue()
+        assert begins in text
+        assert (b"trajectory:" in text) == (name == "ros-goal")
+        assert (b"velocities" in text, b"accelerations" in text) == stated
+        verify(io.BytesIO(text), [rows], columns)
+        with pytest.raises(TrajcliError):
+            FORMATS[name].functions(motion(1.001, orders))[1](io.BytesIO(text), [rows], columns)
+    assert Goal((), None).orders == 3

@@ -158,9 +158,10 @@ def parse_urdf(data: bytes, file: str, *, visuals: bool = False) -> UrdfDocument
     if len(data) > MAX_BYTES:
         message = f"the file is {len(data) / 1e6:.1f} MB long; at most {MAX_BYTES / 1e6:g} MB are read"
         raise InputError(Problem(message, place=Place(file, 1, 1)))
+    data = data.removeprefix(codecs.BOM_UTF8)  # a column of the first line for expat
     blank = len(data) - len(data.lstrip(b" \t\r\n"))  # some files begin with an empty line
     wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    lines = tuple(data.decode("utf-16" if wide else "utf-8-sig", "replace").splitlines())
+    lines = tuple(data.decode("utf-16" if wide else "utf-8", "replace").splitlines())
     skipped = [name for name in _SKIPPED if not visuals or name not in ("visual", "material")]
     root = _Builder(file, lines, data[:blank].count(b"\n"), skipped).parse(data[blank:])
     stem = utf8(PurePath(file).stem)
