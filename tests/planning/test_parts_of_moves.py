@@ -14,6 +14,8 @@ from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, MountedTool, Payload, Robot, unlimited
+from trajcli.planners.point_to_point.jerk_limited import JerkLimited
+from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.planned_move import (
     Stand,
     law_of_path,
@@ -165,3 +167,53 @@ def test_a_move_lasts_whole_periods_where_that_is_asked(output: str, duration: f
     )
     move = plan_move_within(job, 0, job.job.moves[0], resting(np.zeros(1)), job.robot)
     assert move.duration == pytest.approx(duration, rel=1e-12)
+
+
+def within(planner: str, adapted: Adaptation | None, over: str = "slow", index: int = 0) -> Any:
+    """Return a move of a joint of 1 rad as it is planned with an adaptation."""
+    job = job_from_text(
+        "version: 1\nrobot: {joints: 1}\nlimits: {velocity: 1, acceleration: 2, jerk: 9}\nstart: {joints: 0}\n"
+        f"when_over_limit: {over}\nmoves: [{{planner: {planner}, to: {{joints: 1}}}}]\n"
+    )
+    return plan_move_within(job, index, job.job.moves[0], resting(np.zeros(1)), job.robot, adapted)
+
+
+def test_a_move_is_stretched_as_it_is_adapted_where_it_may_be_slowed() -> None:
+    plain = within("jerk_limited", None)
+    for factor in (1.0, 1.25):
+        adapted = Adaptation(stretches={3: factor})
+        made = within("jerk_limited", adapted, index=3)
+        assert made.duration == pytest.approx(factor * plain.duration, rel=1e-9)
+        assert within("jerk_limited", Adaptation(stretches={0: 9.0}), index=3).duration == plain.duration
+        kept = within("jerk_limited", Adaptation(stretches={3: factor}), "error", index=3)
+        assert kept.duration == pytest.approx(plain.duration, rel=1e-12)
+
+
+def test_what_is_known_of_a_move_is_not_planned_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """But another move from the same start is: it may have other limits."""
+    asked: list[Any] = []
+    plan = JerkLimited.plan
+    monkeypatch.setattr(JerkLimited, "plan", lambda *given: asked.append(given) or plan(*given))
+    adapted = Adaptation(stretches={0: 1.5})
+    made = [within("jerk_limited", adapted, index=k) for k in (0, 2, 0, 2)]
+    assert [each.index for each in made] == [0, 2, 0, 2]
+    assert made[0].duration == made[2].duration == pytest.approx(1.5 * made[1].duration, rel=1e-9)
+    count = len(asked)
+    assert count >= 2
+    within("jerk_limited", adapted, index=2)
+    assert len(asked) == count
+    within("jerk_limited", Adaptation(), index=2)
+    assert len(asked) > count
+
+
+@pytest.mark.parametrize("period", [0.1, 0.03])
+def test_breaks_of_a_move_stand_on_rows_where_that_is_asked(period: float) -> None:
+    plain = within("jerk_limited", Adaptation())
+    made = within("jerk_limited", Adaptation(period=period))
+    rows = made.planned.curve.breaks / period
+    np.testing.assert_allclose(rows, np.rint(rows), rtol=0, atol=1e-9)
+    assert plain.duration <= made.duration < plain.duration + 8 * period
+    off = plain.planned.curve.breaks / period
+    assert np.abs(off - np.rint(off)).max() > 1e-3
+    kept = within("jerk_limited", Adaptation(period=period), "error")
+    assert kept.duration == pytest.approx(plain.duration, rel=1e-12)
