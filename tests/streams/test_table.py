@@ -137,6 +137,14 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path, text, expected):
     assert flaws(tmp_path, text) == expected
 
 
+def test_a_long_cell_is_shown_by_its_beginning(tmp_path):
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, f"t,q1\n0,{'xy' * 150}\n")
+    (problem,) = caught.value.problems
+    assert problem.message == f"q1 is '{'xy' * 20}...', expected a finite number"
+    assert problem.place.source == f"0,{'xy' * 99}"
+
+
 def test_one_thing_is_said(tmp_path):
     assert len(flaws(tmp_path, "t,q1,q2\n" + "x,y,z\n" * 100)) == 1
 
@@ -247,13 +255,24 @@ def test_a_name_is_shown_where_its_own_column_is_named(separator, sign):
     assert (whole.column, whole.length) == (1, len(text))
 
 
-@pytest.mark.parametrize("row", ['"1","2","x"', '"1",  "2" ,x', '1,2,"x"', '"x1x","2","x"', '1,"nan",3'])
+@pytest.mark.parametrize(
+    "row",
+    [
+        '"1","2","x"',
+        '"1",  "2" ,x',
+        '1,2,"x"',
+        '"x1x","2","x"',
+        '1,"nan",3',
+        '"1e5","2","e"',
+        '"2","1e5","e"',
+    ],
+)
 def test_a_wrong_cell_in_quotation_marks_is_shown_where_it_stands(tmp_path, row):
     with pytest.raises(InputError) as caught:
         read(tmp_path, f'"t","q1","q2"\n"0","1","2"\n{row}\n')
     place = caught.value.problems[0].place
     cells = [cell.strip().strip('"') for cell in row.split(",")]
-    wrong = next(k for k, cell in enumerate(cells) if not cell.isdecimal())
+    wrong = next(k for k, cell in enumerate(cells) if cell != "1e5" and not cell.isdecimal())
     begins = len(",".join(row.split(",")[:wrong])) + bool(wrong)
     begins += len(row.split(",")[wrong]) - len(row.split(",")[wrong].lstrip(' "'))
     assert (place.line, place.column - 1, place.length) == (3, begins, len(cells[wrong]))

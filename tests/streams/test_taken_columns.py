@@ -68,5 +68,14 @@ def test_texts_that_must_be_the_same_are_compared_in_each_block(form: str) -> No
     reader = reader_of("t,name,q1", [0, 2], [1])
     for row in rows[:5]:
         reader.read(row.encode())
-    with pytest.raises(InputError, match="about other joints than the first one"):
+    with pytest.raises(InputError, match="about other joints than the first one") as caught:
         reader.read(rows[5].encode())
+    assert caught.value.problems[0].place is not None
+    assert caught.value.problems[0].place.line == 7
+
+
+def test_a_comma_in_a_text_that_is_not_taken_makes_no_cell_more() -> None:
+    reader = reader_of("t,said,q1,q2", [0, 3])
+    with pytest.raises(InputError, match="the line has 3 values, expected 4"):
+        reader.read(b'1,"a,b",7\n')
+    assert reader_of("t,said,q1", [0, 2]).read(b'1,"a,b",7\n').tolist() == [[1, 7]]
