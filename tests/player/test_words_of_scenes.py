@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace as Some
 from typing import Any
 
 import numpy as np
 import pytest
 
 from trajcli.job.read import job_from_text
+from trajcli.planners.planner import Event
 from trajcli.planning.causes import causes_of
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.player.scene import dressed, scene_of_plan, scene_of_two, waypoints_of
+from trajcli.player.scene import _notes, dressed, scene_of_plan, scene_of_two, waypoints_of
 
 JOB = """
 version: 1
@@ -53,6 +56,8 @@ def test_an_event_stands_at_the_start_of_its_move_and_those_of_trajcli_itself_ar
     plan, scene = planned("slow")
     shown = [event for event in plan.events if not event.is_internal]
     assert len(scene["events"]) == len(shown) >= 1
+    more = (*plan.events, Event("bound", "near the fastest"), Event("refined", "so often"))
+    assert scene_of_plan(replace(plan, events=more))["events"] == scene["events"]
     (slowed,) = (
         event for event in scene["events"] if "stretched" in event["message"] or "slowed" in event["message"]
     )
@@ -116,3 +121,21 @@ def test_a_hundred_steps_are_listed_and_it_is_said_of_how_many() -> None:
 def test_forty_points_at_most_are_shown(count: int) -> None:
     shown = waypoints_of([(float(k), np.array([0.01 * k]), "") for k in range(count)])
     assert len(shown) == (count if count <= 40 else -(-count // -(-count // 40)))
+
+
+def test_every_remark_and_all_that_was_not_judged_are_noted() -> None:
+    verdict = Some(
+        unchecked_of_tool=("angular_speed", "jerk"),
+        sampled=(("deviation", (0, 1)), ("singularity", tuple(range(25)))),
+        steps=(),
+    )
+    remarks = (Event("note", "one"), Event("note", "two"))
+    plan = Some(remarks=remarks, unchecked="jerk of turn", verdict=verdict, flyby=None)
+    assert list(_notes(plan)) == [  # type: ignore[arg-type]
+        "one",
+        "two",
+        "Without a limit, not checked: jerk of turn.",
+        "Limited, but not checked in every move: angular speed, jerk of the tool.",
+        "On samples only: deviation, moves 0, 1.",
+        f"On samples only: singularity, moves {', '.join(map(str, range(20)))}, ....",
+    ]

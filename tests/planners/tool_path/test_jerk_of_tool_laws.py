@@ -14,6 +14,7 @@ from trajcli.curves.third_order.jerk import LawJerkConstraint
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
 from trajcli.geometry.paths.arc import Arc
+from trajcli.geometry.paths.chain import join
 from trajcli.geometry.paths.orientation import AxisAngleOrientation, SegmentProgress
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.geometry.paths.position import Line, Pivot
@@ -34,6 +35,7 @@ START = np.array([0.5, 0.0, 0.0])
 ALONG_X, ALONG_Z = Line(START, np.array([0.9, 0.0, 0.0])), Line(START, np.array([0.5, 0.0, 0.4]))
 IN_Z = Arc.through(START, np.array([0.6, 0.0, 0.1]), np.array([0.7, 0.0, 0.0]))
 UPRIGHT = Arc.through(START, np.array([0.5, 0.1, 0.1]), np.array([0.5, 0.0, 0.2]))
+THEN_BENT = join([Line(np.array([0.4, 0.0, 0.0]), START), IN_Z])
 TURN = Pivot(START, START, 0.8)
 
 
@@ -73,7 +75,7 @@ def test_along_a_line_the_jerk_of_the_law_is_that_of_the_tool(
     assert constraints(line, jerk, angular, own) == (of_law, of_tool)
 
 
-@pytest.mark.parametrize("arc", [IN_Z, UPRIGHT])
+@pytest.mark.parametrize("arc", [IN_Z, UPRIGHT, THEN_BENT])
 @pytest.mark.parametrize(
     ("jerk", "angular", "own", "of_law", "of_tool"),
     [
