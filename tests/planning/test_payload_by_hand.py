@@ -195,6 +195,21 @@ def test_a_job_that_does_not_verify_empty_says_where(move: int) -> None:
     assert (problem.place.file, problem.place.line) == ("job.yaml", row + 1)
 
 
+def test_of_several_things_that_are_wrong_without_a_payload_the_effort_is_named() -> None:
+    """In a horizontal plane: the first move is too fast, and 0.1 N m do not move the second one in 1.5 s."""
+    text = EMPTY.replace("duration: 2}", "duration: 0.6}").replace(
+        "limits: {effort: {a: 90, b: [-40, 30]}}\n", ""
+    )
+    text = text.replace("duration: 1.5}", "duration: 1.5, limits: {effort: {a: 0.1}}}")
+    text = text.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
+    findings = plan_job(job_from_text(text)).verdict.findings
+    assert findings[0].kind != "effort"
+    with pytest.raises(VerificationError, match="a needs a torque of") as refused:
+        payload_capacity(job_from_text(text))
+    (problem,) = refused.value.problems
+    assert (problem.joint, problem.move) == ("a", 1)
+
+
 def test_what_is_missing_is_said_at_its_place() -> None:
     text = EMPTY.replace("effort: {a: 90, b: [-40, 30]}", "velocity: 90")
     with pytest.raises(InputError, match="no limit of effort is in force") as refused:
