@@ -623,3 +623,18 @@ def test_whole_numbers_of_radians_per_second_are_exact_to_who_reads_them(tmp_pat
     source.write_text("t,q1,qd1\n" + "".join(lines))
     with pytest.raises(VerificationError, match="the velocity of j1 says 19 rad/s"):
         retimed(source, robot(tmp_path / "arm.yaml", "velocity: 20"), fastest=True)
+
+
+@pytest.mark.parametrize("ending", ["mcap", "yaml"])
+def test_whole_nanoseconds_make_nothing_faster_than_it_may_be(ending: str, tmp_path: Path) -> None:
+    """Lines between six rows: the step in the middle takes 0.2 s of 1, and stamps of messages round what it becomes."""
+    t = np.arange(6) / 5
+    rows = zip(t, quintic(t, 1.0, 1.0)[0], strict=True)
+    source, path = tmp_path / "rows.csv", str(tmp_path / f"out.{ending}")
+    source.write_text("t,q1\n" + "".join(f"{a:.1f},{b:.17g}\n" for a, b in rows))
+    kept = kept_limits(None, str(robot(tmp_path / "arm.yaml", "velocity: 3.7")))
+    motion = read_motion(str(source), ReadingOptions())
+    found, (stretch,) = retime(motion, kept.requirements, fastest=True, as_read=partial(as_read, path=path))
+    assert stretch.factor == pytest.approx(5 * (0.68256 - 0.31744) / 3.7, rel=1e-5)
+    write_motion(found, path)
+    assert verdict(Path(path), tmp_path / "arm.yaml") != "exceeded"

@@ -118,6 +118,21 @@ def test_a_reader_is_foretold_the_rounding_of_decimals_alone(tmp_path: Path, end
     assert (np.abs(found - third.rows.q).max() > 1e-12) == (ending == "csv")
 
 
+@pytest.mark.parametrize("names", ["t,q1", "t_ms,q1"])
+@pytest.mark.parametrize("ending", ["mcap", "yaml", "jsonl", "csv"])
+def test_stamps_are_foretold_as_a_reader_finds_them(tmp_path: Path, ending: str, names: str) -> None:
+    """The peer is the reader: whole nanoseconds of messages, all digits of lines of JSON, decimals of a table."""
+    motion = read(tmp_path / "rows.csv", f"{names}\n0.000,0.1\n1.000,0.2\n2.500,0.3\n")
+    third = replace(motion, rows=replace(motion.rows, t=motion.rows.t / 3))
+    path = str(tmp_path / f"out.{ending}")
+    write_motion(third, path)
+    found, foretold = (
+        each.rows for each in (read_motion(path, ReadingOptions(units="rad")), as_read(third, path))
+    )
+    np.testing.assert_allclose(found.t, foretold.t, rtol=1e-15, atol=0)
+    assert foretold.resolution.time == pytest.approx(found.resolution.time, rel=1e-12, abs=1e-15)
+
+
 @pytest.mark.parametrize("given", ["q", "q qd", "q qdd", "q qd qdd", "q tau", "q qd tau"])
 def test_a_log_states_what_the_columns_state(tmp_path: Path, given: str) -> None:
     """As mcap_ros2 reads it: empty arrays where there is no column, and no topic of accelerations without any."""

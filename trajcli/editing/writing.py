@@ -65,9 +65,16 @@ def as_read(motion: EditedMotion, path: str | None, form: FormatName | None = No
     Raises:
         InputError: When nothing says the format.
     """
-    if format_of(path, form).name == "CSV":
+    chosen = format_of(path, form)
+    if chosen.name == "CSV":
         return replace(motion, columns=_table_columns(motion)).as_written()
-    exact = tuple(replace(column, decimals=None) for column in motion.columns)
+    stamps = None if chosen.content == "rows" else DECIMALS  # whole nanoseconds
+    exact = tuple(
+        replace(column, decimals=None)
+        if column.quantity != "t"
+        else replace(column, factor=1.0, decimals=stamps)
+        for column in motion.columns
+    )
     return replace(motion, columns=exact).as_written()
 
 
