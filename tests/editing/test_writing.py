@@ -253,3 +253,16 @@ def test_a_message_states_what_the_file_states(
     for row, point in zip(rows, points, strict=True):
         assert [*point] == [*keys, "time_from_start"]
         np.testing.assert_allclose([point[key][0] for key in keys], row[1 : 1 + stated], atol=1e-9)
+
+
+def test_a_log_of_a_table_is_compressed_and_has_no_topic_that_nobody_asked_for(tmp_path: Path) -> None:
+    """Those of a plan that are about its arm are not there, nor those that are written on request."""
+    from mcap.reader import make_reader
+
+    write_motion(read(tmp_path / "rows.csv", TABLES[1]), str(tmp_path / "a.mcap"), None)
+    with (tmp_path / "a.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    assert {chunk.compression for chunk in summary.chunk_indexes} == {"zstd"}
+    topics = {channel.topic for channel in summary.channels.values()}
+    assert topics == {"/joint_states", "/joint_trajectory"}
