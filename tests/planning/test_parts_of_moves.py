@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.errors import InputError
+from trajcli.errors import InputError, PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, MountedTool, Payload, Robot, unlimited
@@ -217,3 +217,12 @@ def test_breaks_of_a_move_stand_on_rows_where_that_is_asked(period: float) -> No
     assert np.abs(off - np.rint(off)).max() > 1e-3
     kept = within("jerk_limited", Adaptation(period=period), "error")
     assert kept.duration == pytest.approx(plain.duration, rel=1e-12)
+
+
+def test_a_duration_that_is_too_short_is_lengthened_where_the_move_may_be_slowed() -> None:
+    """To that of the fastest trapezoid: 1 rad at 1 rad/s, and as long as the half of it to get there and stop."""
+    short = "trapezoid, duration: 0.5"
+    made = within(short, None)
+    assert made.duration == pytest.approx(1 / 1 + 1 / 2, rel=1e-5)
+    with pytest.raises(PlanningError):
+        within(short, None, "error")
