@@ -16,7 +16,14 @@ from trajcli.grids import ListedGrid, UniformGrid
 from trajcli.job.read import job_from_text, load_job
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.output.delivery import joined_rows as module
-from trajcli.output.delivery.joined import OtherRows, joined_rows, rows_report, rows_that_keep, with_event
+from trajcli.output.delivery.joined import (
+    OtherRows,
+    joined_rows,
+    rows_report,
+    rows_that_keep,
+    with_event,
+    write_plan,
+)
 from trajcli.output.write import grid_of
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.samples import sample
@@ -145,6 +152,20 @@ def test_the_columns_that_join_knots_to_the_motion_are_named() -> None:
     shown, _ = with_event(plan, joined_rows(plan, grid_of(plan), FORMATS["csv"]), FORMATS["csv"])
     assert '`--set "output.columns=[t, q, qd]"` keeps every limit' in shown.events[-1].message
     assert factor_by_scipy(planned("blends_ur5e", sets[0], "output.columns=[t, q, qd]")) < 1 + 1e-6
+
+
+@pytest.mark.parametrize(
+    "columns", ["t, pose", "t, pose, twist", "t, pose, twist, twistd", "t, twistd, pose"]
+)
+def test_rows_of_the_tool_are_joined_as_check_joins_them(tmp_path: Path, columns: str) -> None:
+    """Also of a gantry, whose three joints the rates of its tool tell as well as those of six."""
+    from trajcli.judge.file import CheckOptions, check_file
+
+    plan = planned("gantry", f"output.columns=[{columns}]")
+    write_plan(plan, str(tmp_path / "rows.csv"))
+    read = check_file(str(tmp_path / "rows.csv"), CheckOptions(), plan).judgement
+    assert read.planned_rows
+    assert joined_rows(plan, grid_of(plan), FORMATS["csv"]).interpolation == read.interpolation
 
 
 AT_A_STOP = """\

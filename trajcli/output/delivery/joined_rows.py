@@ -71,7 +71,7 @@ class JoinedRows:
     @property
     def interpolation(self) -> Interpolation | None:
         """How the columns join the rows; None where no positions or poses with times are among them."""
-        of_poses = _OF_POSES[: 3 if len(self.plan.trajectory.joint_names) == _OF_A_TOOL else 1]
+        of_poses = _OF_POSES[: 3 if len(self.plan.trajectory.joint_names) <= _OF_A_TOOL else 1]
         wanted = _STATES if set(_STATES) & set(self.groups) else of_poses
         there = [group in self.groups for group in wanted]
         if "t" not in self.groups or not there[0]:
