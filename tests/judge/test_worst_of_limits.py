@@ -417,3 +417,35 @@ def test_a_weight_that_hangs_still_has_no_friction(side: int) -> None:
     assert (found.kind, found.severity) == ("effort", "error")
     assert found.value == pytest.approx(side * MASS * 9.81, rel=1e-5)
     assert found.rounding < 1e-9
+
+
+@pytest.mark.parametrize(("share", "certainty"), [(0.9, "within rounding"), (1.1, "exceeded")])
+def test_a_centripetal_force_is_as_uncertain_as_the_turning_that_makes_it(
+    share: float, certainty: str
+) -> None:
+    """A slide holds 2 kg half a metre from an axis that turns with 3 rad/s: 9 N, and 2 m r w for each rad/s of error."""
+    link = LinkInertia(MASS, (0.0, 0.0, 0.0), (0.0,) * 6)
+    joints = (Joint("turn", link=link), Joint("slide", "prismatic", alpha=np.pi / 2, link=link))
+    off, force = 5e-4, MASS * 0.5 * 3.0**2
+    rounding = 2 * MASS * 0.5 * 3.0 * off  # of a row; of the quintic between them more, as above
+    effort = np.array([[-np.inf, np.inf], [-(force - share * rounding), np.inf]])
+    limits = replace(unlimited(2), effort=effort)
+    arm = Robot("arm", joints, limits, "modified", np.eye(4), np.eye(4), gravity=np.zeros(3))
+    t, still = 100.0 * np.arange(3), np.zeros((3, 2))
+    resolution = Resolution(0.0, np.zeros(2), np.array([off, 0.0]), np.zeros(2))
+    rows = RecordedMotion(
+        t,
+        np.stack([3.0 * t, still[:, 1] + 0.5], axis=1),
+        np.stack([still[:, 0] + 3.0, still[:, 1]], axis=1),
+        still,
+        None,
+        None,
+        None,
+        None,
+        resolution,
+        "rows",
+    )
+    (found,) = [f for f in judge_motion(lambda: [rows], Requirements(arm)).findings if f.kind == "effort"]
+    assert (found.value, found.certainty) == (pytest.approx(-force, rel=1e-4), certainty)
+    between = 1.875 + 2.0 + 1.0 if share < 1 else 1.0
+    assert found.rounding == pytest.approx(between * rounding, rel=0.01)

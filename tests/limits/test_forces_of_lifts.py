@@ -11,7 +11,7 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.dynamics.effort_bound import EffortPeak
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, unlimited
-from trajcli.limits.effort import FAMILY, MoveEfforts
+from trajcli.limits.effort import FAMILY, MoveEfforts, gravity_problem
 from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.tolerances import EFFORT_RELATIVE
 from trajcli.trajectory import Span, State, Trajectory
@@ -206,3 +206,27 @@ def test_a_move_without_length_and_an_arm_that_nobody_knows_have_none() -> None:
     assert FAMILY.survey(replace(move, robot=None)) is None
     still = replace(move, span=replace(move.span, end=move.span.start))
     assert FAMILY.survey(still) is None
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_force_behind_a_turning_joint_is_told_in_newtons_with_its_own_name(side: float) -> None:
+    """5 kg on a lift that stands on a turntable, sped up by 0.5 m/s^2 against 3 N of friction."""
+    robot = lifts([WIDE, [-40.0, 40.0]], side * G)
+    slide = replace(robot.joints[1], friction=Friction(3.0, 0.0))
+    robot = replace(robot, joints=(Joint("turn", link=robot.joints[0].link), slide))
+    (found,) = over(robot, side * 0.5)
+    sign = "-" * (side < 0)
+    assert found.text().startswith(f"s1 needs a force of {sign}54.55")
+    assert found.text().endswith(f"{sign}49.05 N of it against gravity; its limit is {sign}40 N")
+
+
+@pytest.mark.parametrize(("rubs", "time"), [(True, 0.25), (False, None)])
+def test_what_gravity_alone_takes_is_told_with_its_place(time: float | None, *, rubs: bool) -> None:
+    robot = lifts([WIDE, [-40.0, 40.0]])
+    robot = replace(robot, joints=(Joint("turn", link=robot.joints[0].link), robot.joints[1]))
+    problem = gravity_problem(robot, 1, -52.05, -40.0, np.array([0.5, 0.1]), rubs=rubs, time=time)
+    cause, when = ("gravity with friction", "at t = 0.25 s of the move, ") if rubs else ("gravity", "")
+    joints = "0.5, 0.1: 12.05 N more than its effort limit of -40 N"
+    assert problem.text() == f"{cause} alone takes -52.05 N of s1 {when}with the joints at {joints}"
+    assert [problem.amounts[name].joint for name in ("q0", "q1")] == [0, 1]
+    assert (problem.joint, problem.time, problem.value, problem.limit) == ("s1", time, -52.05, -40.0)
