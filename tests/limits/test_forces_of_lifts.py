@@ -10,7 +10,7 @@ import pytest
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.dynamics.effort_bound import EffortPeak
 from trajcli.findings import Finding
-from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Robot, unlimited
+from trajcli.kinematics.robot import Friction, Joint, LinkInertia, Payload, Robot, unlimited
 from trajcli.limits.effort import FAMILY, MoveEfforts, gravity_problem
 from trajcli.limits.kinds import LimitedMove
 from trajcli.limits.tolerances import EFFORT_RELATIVE
@@ -230,3 +230,12 @@ def test_what_gravity_alone_takes_is_told_with_its_place(time: float | None, *, 
     assert problem.text() == f"{cause} alone takes -52.05 N of s1 {when}with the joints at {joints}"
     assert [problem.amounts[name].joint for name in ("q0", "q1")] == [0, 1]
     assert (problem.joint, problem.time, problem.value, problem.limit) == ("s1", time, -52.05, -40.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_a_lift_carries_counts(side: float) -> None:
+    """5 kg and 2 kg more, 68.67 N."""
+    carried = Payload(2.0, np.zeros(3), np.zeros((3, 3)))
+    robot = replace(lifts([WIDE, [-60.0, 60.0]], side * G), payload=carried)
+    (found,) = over(robot, 0.0)
+    assert found.value == pytest.approx(side * 7.0 * G, rel=1e-6)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import ruckig
 
+from trajcli.curves.phases import PhaseChain
 from trajcli.planners.ruckig import (
     BoundaryProblem,
     PhaseProfile,
@@ -251,3 +252,30 @@ def test_where_one_must_last_longer_those_before_and_behind_it_last_as_long(turn
     assert len({each.duration for each in made}) == 1
     for each, profile in zip(asked, made, strict=True):
         assert float(profile.curve().evaluate(profile.duration)[0]) == pytest.approx(each.final[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("left", "name"), [(1e-3, "cruise"), (-1e-3, "cruise"), (1e-12, "rest"), (-1e-12, "rest"), (0.0, "rest")]
+)
+@pytest.mark.parametrize("scale", [1.0, 1e-6])
+def test_a_phase_that_is_slow_beside_the_others_is_a_cruise_and_what_rounding_leaves_is_rest(
+    left: float, name: str, scale: float
+) -> None:
+    """From the peak velocity down to a thousandth of it, or to what rounding leaves; in metres and in micrometres."""
+    start, brake = (0.0, scale), -scale * (1.0 - left)
+    chain = PhaseChain(start, (np.nan, np.nan), (1.0, 2.0), (brake, 0.0))
+    assert names(PhaseProfile(0.0, chain, 3.0)) == ["constant acceleration", name]
+
+
+@pytest.mark.parametrize("final", [(0.0, 0.3, 1.0), (0.4, -0.5, 1.0), (0.0, -0.5, 0.9)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_comes_back_otherwise_than_it_went_ends_where_it_shall(final: Any, side: float) -> None:
+    """Alone what comes back to its place with the opposite velocity and the same acceleration is a change of velocity."""
+    target = [side * value for value in final]
+    asked = problem(target, (0.0, side * 0.5, side * 1.0))
+    quickest = fastest(asked)
+    assert quickest.duration == pytest.approx(own(asked).duration, rel=1e-9)
+    for made in (quickest, fastest_of(asked, 2.0 * quickest.duration, quickest)):
+        curve = made.curve()
+        ends = [float(curve.evaluate(curve.end, order, side="left")[0]) for order in range(3)]
+        assert ends == pytest.approx(target, abs=1e-12)
