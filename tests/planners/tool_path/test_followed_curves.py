@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,9 +14,15 @@ from trajcli.geometry.paths.position import Line
 from trajcli.kinematics.following.tolerance import Tolerance, ToleranceRatio
 from trajcli.kinematics.following.tool_path import SpeedLimits, ToolPath
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.jacobian import jacobian
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
 from trajcli.planners.tool_path import follow
-from trajcli.planners.tool_path.follow import FollowedPath, followed
+from trajcli.planners.tool_path.follow import (
+    FollowedPath,
+    FollowingDiagnosis,
+    diagnosis_on_path,
+    followed,
+)
 
 ARM = Robot("planar", (Joint("a", a=0.5), Joint("b", a=0.5)), unlimited(2), "standard", np.eye(4), np.eye(4))
 START = np.array([0.1, 0.8])
@@ -88,3 +95,45 @@ def test_a_free_turn_counts_where_some_segment_or_the_whole_path_limits_it(
     turning = np.abs(seen.poses.evaluate(np.array([0.2]))[1][:, 3:]).max()
     assert (turning > 0.1) == counts
     assert counts or seen is made.path
+
+
+@pytest.mark.parametrize("elbow", [1e-2, -3e-4])
+def test_a_singularity_is_told_by_the_smallest_over_the_largest_singular_value(elbow: float) -> None:
+    made, joints = line(), np.array([0.3, elbow])
+    largest, smallest = np.linalg.svd(jacobian(ARM, joints)[:2], compute_uv=False)
+    error = diagnosis_on_path(ARM, made.path, made.follower)._singular(0.2, joints, np.array([3.0, -9.0]))
+    said = re.search(r"singular value (\S+)\)", error.problems[0].message)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(smallest / largest, rel=0.05)
+    assert error.problems[0].joint == "b"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of an arm at some places of a path."""
+
+    s: np.ndarray
+    orientation: str
+
+
+@pytest.mark.parametrize(
+    ("reached", "orientation", "advised"),
+    [
+        ({1, 2, 3}, "all", True),
+        ({1, 2}, "all", False),
+        ({2, 3}, "all", False),
+        ({1}, "all", False),
+        (set(), "all", False),
+        ({1, 2, 3}, "direction", False),  # nothing is left that could be free
+    ],
+)
+def test_a_free_roll_is_advised_where_all_of_the_path_is_reached_with_it(
+    monkeypatch: pytest.MonkeyPatch, reached: set[int], orientation: str, advised: bool
+) -> None:
+    def answers(own: FollowingDiagnosis, asked: Asked) -> tuple[list[np.ndarray], np.ndarray]:
+        assert asked.orientation == "direction"
+        return [START[None] if int(s) in reached else START[None][:0] for s in asked.s], np.zeros((0, 2))
+
+    monkeypatch.setattr(FollowingDiagnosis, "_answers", answers)
+    diagnosis = FollowingDiagnosis(ARM, lambda s, _: Asked(s, orientation), 3.0, None, False)  # type: ignore[arg-type, return-value]
+    assert diagnosis._reached_with_free_roll(np.array([1.0, 2.0, 3.0])) is advised
