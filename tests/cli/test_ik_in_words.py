@@ -6,9 +6,12 @@ Oracle: the formulas of the planar arm, of 0.3 m and 0.2 m, and of a SCARA; the 
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from arm_calls import Arms
+
+from trajcli.cli.ik import _lines
 
 DOWN = "{xyz: [0.4, 0.1, 0.3], rpy: [180, 0, 0]}"
 ELBOW = "{xyz: [0.3, 0.2, 0]}"  # the second joint at 90 deg either way
@@ -133,3 +136,26 @@ def test_tool_base_and_pins_of_one_pose_count(arms: Arms) -> None:
     assert pytest.approx([0, 90], abs=1e-9) in [each["joints"] for each in told]
     pinned = arms.json("ik", "-r", "planar2r", "--pose", "{xyz: [0.3, 0.2, 0], configuration: {elbow: down}}")
     assert [each["joints"] for each in pinned] == [pytest.approx([0, 90], abs=1e-9)]
+
+
+def test_an_answer_is_followed_by_what_is_to_be_known_of_it() -> None:
+    answer = {"joints": [1.0, -2.5], "within_limits": True, "singular": False, "closure": 1e-15, "branch": {}}
+    more = {
+        "branch": {"shoulder": "left", "elbow": "up"},
+        "within_limits": False,
+        "singular": True,
+        "free_direction": [0.6, 0.8],
+        "turns_not_met": ["a", "b"],
+        "closure": 2.5e-7,
+    }
+    joints = (SimpleNamespace(name="a"), SimpleNamespace(name="b"))
+    arm = SimpleNamespace(
+        robot=SimpleNamespace(name="arm", joints=joints), joint_unit=lambda i: ("deg", "mm")[i]
+    )
+    solutions = SimpleNamespace(method=SimpleNamespace(name="a table"))
+    assert list(_lines(arm, solutions, [answer, {**answer, **more}])) == [  # type: ignore[arg-type]
+        "2 answers for arm (deg, mm), by a table:",
+        "  1  -2.5",
+        "  1  -2.5   (left up, outside the limits, singular, free along 0.6  0.8, turns of a, b not as asked)",
+        "they miss the pose by at most 2.5e-07 (m, rad)",
+    ]
