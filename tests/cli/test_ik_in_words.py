@@ -6,6 +6,8 @@ Oracle: the formulas of the planar arm, of 0.3 m and 0.2 m, and of a SCARA; the 
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -159,3 +161,23 @@ def test_an_answer_is_followed_by_what_is_to_be_known_of_it() -> None:
         "  1  -2.5   (left up, outside the limits, singular, free along 0.6  0.8, turns of a, b not as asked)",
         "they miss the pose by at most 2.5e-07 (m, rad)",
     ]
+
+
+def test_the_base_that_is_advised_for_rows_in_a_frame_is_where_the_arm_stands(
+    arms: Arms, tmp_path: Path
+) -> None:
+    """An arm a metre along x; the table is turned a quarter about z, 0.1 m along x."""
+    job = tmp_path / "job.yaml"
+    job.write_text(
+        "version: 1\nrobot: planar2r\nbase: {xyz: [1, 0, 0]}\nstart: {joints: [0, 0]}\n"
+        "frames: {table: {xyz: [0.1, 0, 0], rpy: [0, 0, 1.5707963267948966]}}\n"
+        "moves: [{planner: hold, duration: 1}]\noutput: {in: table}\n"
+    )
+    rows = {"table": "x,y,z\n0.2,-1.2,0\n", "world": "x,y,z\n1.3,0.2,0\n"}
+    words = ("ik", "-r", job, "--near", "0,1.5")
+    refused = arms.call(*words, "-", stdin=rows["table"])
+    assert refused.code == 2
+    for name, text in rows.items():
+        (base,) = re.findall(rf"--base '([^']*)' in {name}", refused.err)
+        out = arms.call(*words, "--base", base, "-", stdin=text).out
+        assert [float(cell) for cell in out.splitlines()[1].split(",")] == pytest.approx([0, math.pi / 2])

@@ -61,7 +61,7 @@ class PlotCommand(Command):
         str | None,
         option(
             "--output -o",
-            "FILE.svg, .png or .pdf; - is stdout. Else the first name's stem with .svg, in this folder.",
+            "FILE.svg, .png or .pdf; - is stdout. Else the stem of the first job, or file, with .svg, here.",
             "FILE",
         ),
     ] = None
