@@ -98,6 +98,11 @@ def test_rows_are_answered_from_where_it_is_told_with_the_digits_that_are_asked_
     ]
 
 
+def test_every_answer_is_in_the_turn_that_is_near(arms: Arms) -> None:
+    out = arms.call("ik", "-r", "planar2r", "--all", "--near", "0,800", "-", stdin=ROWS).out
+    assert [float(line.split(",")[3]) for line in out.splitlines()[1:]] == pytest.approx([630, 810])
+
+
 @pytest.mark.parametrize("every", [(), ("--all",)])
 def test_rows_are_met_as_near_as_is_asked_for(every: tuple[str, ...], arms: Arms) -> None:
     rows = "x,y,z\n0.3,0.2,0.0001\n"

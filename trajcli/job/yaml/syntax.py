@@ -244,6 +244,9 @@ def _after_end(complaint: _Complaint) -> _Verdict:
         return _Verdict(f"'{complaint.here[0]}' closes nothing", "remove it", complaint.problem)
     if complaint.here.startswith(":"):
         return _Verdict("no space after the colon", "write `key: value`", complaint.problem)
+    before = _line_before(complaint)
+    if complaint.line(before)[:1].isalpha():  # a comment ends what was to be a key
+        return _no_colon(complaint._replace(context=(before, 0)))
     return _Verdict("text after the end of the document", None, complaint.problem, _word(complaint.here))
 
 
