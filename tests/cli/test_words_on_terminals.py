@@ -85,9 +85,9 @@ def test_a_terminal_has_forty_columns_at_least(
 
 
 def test_lines_are_broken_where_they_are_wider_than_the_terminal_as_it_shows_them() -> None:
-    fits, wide = "  " + "x" * 58, "  " + "word " * 12 + "end"
+    fits, wide = "  " + "word " * 11 + "end", "  " + "word " * 12 + "end"
     assert wrapped(fits, Terminal()) == fits
-    coloured = fits.replace("x" * 5, f"{RED}xxxxx{RESET}", 1)
+    coloured = fits.replace("word", f"{RED}word{RESET}", 1)
     assert wrapped(coloured, Terminal()) == coloured  # colours take no columns
     lines = wrapped(wide, Terminal()).splitlines()
     assert len(lines) == 2
@@ -146,15 +146,18 @@ def span(index: int, *, handles: bool = False, label: str = "", ends: str = "") 
     )
 
 
-def tight(each: SimpleNamespace, used: float) -> SimpleNamespace:
+def tight(each: SimpleNamespace, used: float, name: str | None) -> SimpleNamespace:
     share = f"{100 * used:.4g} %"
-    return SimpleNamespace(span=each, name=f"velocity of j{each.index}", share=share, used=used)
+    return SimpleNamespace(span=each, name=name or f"velocity of j{each.index}", share=share, used=used)
 
 
 def lines_of(
-    monkeypatch: pytest.MonkeyPatch, spans: list[SimpleNamespace], uses: dict[int, float]
+    monkeypatch: pytest.MonkeyPatch,
+    spans: list[SimpleNamespace],
+    uses: dict[int, float],
+    name: str | None = None,
 ) -> list[str]:
-    found = [tight(each, uses[each.index]) for each in spans if each.index in uses]
+    found = [tight(each, uses[each.index], name) for each in spans if each.index in uses]
     monkeypatch.setattr("trajcli.planning.tightest.tightest_of_moves", lambda plan: found)
     plan: Any = SimpleNamespace(trajectory=SimpleNamespace(spans=spans))
     return list(tightest_lines(plan, Terminal()))
@@ -176,6 +179,23 @@ def test_the_moves_that_use_most_are_listed_in_their_order(monkeypatch: pytest.M
     few = lines_of(monkeypatch, spans[:11], uses)
     assert len(few) == 11
     assert few[3].split() == ["2", "m2", "(planner)", "1.25", "-", "-"]
+
+
+def test_of_moves_that_use_the_same_the_first_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    spans = [span(k, label=f"m{k}") for k in range(12)]
+    _, *lines, _ = lines_of(monkeypatch, spans, dict.fromkeys(range(12), 0.5))
+    assert [int(line.split()[0]) for line in lines] == list(range(10))
+
+
+@pytest.mark.parametrize(("width", "cut"), [("72", 1), ("60", 2)])
+def test_titles_are_shortened_before_what_binds(
+    width: str, cut: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", width)
+    spans = [span(0, label="a label that is rather long and says a lot")]
+    _, line = lines_of(monkeypatch, spans, {0: 0.5}, "velocity of a_joint_of_the_arm")
+    assert (len(line), line.count("...")) == (int(width), cut)
+    assert ("velocity of a_joint_of_the_arm" in line) == (cut == 1)
 
 
 def test_where_it_is_too_wide_a_move_is_called_by_what_says_most(monkeypatch: pytest.MonkeyPatch) -> None:
