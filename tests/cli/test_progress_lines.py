@@ -98,12 +98,17 @@ def test_steps_are_shown_on_a_terminal_that_has_no_rows(
 
 
 class Gone(Terminal):
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self.error = error
+
     def write(self, text: str) -> int:
-        raise BrokenPipeError
+        raise self.error
 
 
-def test_a_terminal_that_is_gone_is_no_error(clock: Clock) -> None:
-    with ProgressLine(Gone()):
+@pytest.mark.parametrize("error", [BrokenPipeError(), ValueError("closed")])
+def test_a_terminal_that_is_gone_is_no_error(error: Exception, clock: Clock) -> None:
+    with ProgressLine(Gone(error)):
         pass
     assert len(clock.waits) == 5  # the thread has looked to its end
 
