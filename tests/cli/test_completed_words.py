@@ -85,6 +85,7 @@ def test_paths_are_those_that_are_stated_and_those_that_the_planner_knows(job: s
     assert paths == sorted(set(paths))
     assert {
         "version=",
+        "robot.joints.0.name=",
         "robot.joints.2.name=",
         "limits.position.0=",
         "limits.position.1=",
@@ -108,9 +109,21 @@ def test_paths_are_those_that_are_stated_and_those_that_the_planner_knows(job: s
         "when_over_limit=",
         "defaults.law.shape=",
     } <= set(paths)
-    of_move = {"moves.0.limits.velocity=", "moves.0.when_over_limit=", "moves.0.limits.tcp.speed="}
+    of_move = {
+        "moves.1.label=",
+        "moves.0.limits.velocity=",
+        "moves.0.when_over_limit=",
+        "moves.0.limits.tcp.speed=",
+    }
     assert of_move <= set(paths)
     assert not [path for path in paths if path.startswith("moves.1.") and "law" in path]
+
+
+def test_moves_that_are_none_offer_nothing(job: str) -> None:
+    Path(job).write_text(JOB.replace("  - {planner: hold, duration: 1}", "  - home\n  - {planner: hopp}"))
+    assert paths_that_begin(line(job), "moves.0.du") == ["moves.0.duration="]
+    assert paths_that_begin(line(job), "moves.1") == ["moves.1="]
+    assert paths_that_begin(line(job), "moves.2") == ["moves.2.planner="]
 
 
 def test_names_behind_commas_are_not_offered_twice(job: str) -> None:

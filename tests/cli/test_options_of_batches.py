@@ -174,3 +174,17 @@ def test_as_many_processes_work_as_there_are_jobs_cores_or_as_are_named(
     write(**{f"job{k}": JOB for k in range(jobs)})
     assert call(capfd, "batch", ".", *words).code == 0
     assert begun == [(jobs, count, timeout)]
+
+
+def test_the_scheduler_is_the_one_that_is_named(capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    reached: list[Any] = []
+
+    def run_on_cluster(tasks: Any, setup: Any, address: Any, on_tick: Any) -> Any:
+        reached.append((len(tasks), address))
+        yield from ()
+
+    monkeypatch.setattr("trajcli.batches.cluster.run_on_cluster", run_on_cluster)
+    write(a=JOB)
+    for words in ((), ("--scheduler", "tcp://there:1")):
+        assert call(capfd, "batch", "a.yaml", "--engine", "dask", *words).code == 0
+    assert reached == [(1, None), (1, "tcp://there:1")]
