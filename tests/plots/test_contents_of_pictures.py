@@ -319,3 +319,29 @@ def test_speeds_of_the_tool_have_their_limits_findings_and_files() -> None:
     assert [source for source, _ in picture.views.traces] == [0, 1, 2]
     assert picture.views.traces[2][1][0] == pytest.approx([0.8, 0, 0])
     assert len(picture.views.waypoints) > 0
+
+
+@pytest.mark.parametrize(
+    ("files", "called"),
+    [
+        (("a/x.csv", "b/y.csv"), ("x.csv", "y.csv")),
+        (("a/x.csv", "b/x.csv"), ("a/x.csv", "b/x.csv")),
+        (("a/x.csv", "a/x.csv"), ("x.csv", "x.csv")),
+    ],
+)
+def test_files_are_called_without_folders_where_that_tells_them_apart(
+    files: tuple[str, ...], called: tuple[str, ...]
+) -> None:
+    assert picture_of(None, [table(file, "q1") for file in files]).sources == called
+    over = picture_of(plan_of(CUBIC), [table(file, "q1,q2") for file in files], ["q"])
+    assert over.sources == ("job", *called)
+
+
+def test_findings_of_the_plan_and_of_files_stand_together() -> None:
+    """A cubic of 1 rad in 0.25 s reaches 3 / 2 * 4 rad/s = 6 rad/s in its middle."""
+    plan = plan_of(move("cubic", [1, 0], "duration: 0.25"), robot="joints: [{velocity: 5}, {velocity: 5}]")
+    error = Finding("velocity", joint="j1", value=7.0, limit=5.0, time=1.5)
+    files = [table("a.csv", "q1,q2,qd1,qd2"), table("b.csv", "q1,q2,qd1,qd2")]
+    judged = [None, Judgement((error,), "linear", 3)]
+    found = panels(picture_of(plan, files, ["qd"], judgements=judged))["j1: velocity"].findings
+    np.testing.assert_allclose(found, [[0.125, 6.0], [1.5, 7.0]])
