@@ -345,3 +345,38 @@ def test_findings_of_the_plan_and_of_files_stand_together() -> None:
     judged = [None, Judgement((error,), "linear", 3)]
     found = panels(picture_of(plan, files, ["qd"], judgements=judged))["j1: velocity"].findings
     np.testing.assert_allclose(found, [[0.125, 6.0], [1.5, 7.0]])
+
+
+def test_findings_about_the_tool_stand_at_its_speed_or_its_angular_speed() -> None:
+    """The first joint alone turns a stretched arm: 0.8 m from the tool, at 3 / 2 of its mean rate in the middle."""
+    plan = plan_of(
+        move("cubic", [0.4, 0]), robot=GEOMETRY, more="limits: {tcp: {speed: 0.1, angular_speed: 0.2}}\n"
+    )
+    found = panels(picture_of(plan, quantities=["tool"]))
+    for title, value in (("speed of the tool", 0.48), ("angular speed of the tool", 0.6)):
+        rows = found[title].findings
+        own = rows[np.isfinite(rows[:, 1])]
+        np.testing.assert_allclose(own, [[0.5, value]], atol=1e-6)
+        assert len(rows) == 2
+
+
+def test_a_limit_of_the_tool_in_one_move_is_one_of_its_panel() -> None:
+    plan = plan_of(
+        CUBIC, move("cubic", [0, 0], "duration: 1, limits: {tcp: {angular_speed: 9}}"), robot=GEOMETRY
+    )
+    found = panels(picture_of(plan, quantities=["tool"]))
+    titles = ("speed of the tool", "angular speed of the tool")
+    assert [found[title].unlimited for title in titles] == [True, False]
+
+
+def test_of_many_planes_the_first_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = "joints: [{velocity: 9, acceleration: 9}, {velocity: 9, acceleration: 9}]"
+    moves = [
+        f"planner: time_optimal, through: [{{joints: [{k}, 2]}}], to: {{joints: [2, {k}]}}" for k in (1, 3)
+    ]
+    plan = plan_of(*moves, robot=robot)
+    for most, titles in ((1, ["move 0"]), (2, ["move 0", "move 1"])):
+        monkeypatch.setattr("trajcli.plots.picture.MOST_PLANES", most)
+        (block,) = picture_of(plan, quantities=["phase"]).blocks
+        assert [panel.title.split(" time")[0] for panel in block.panels] == titles
+        assert block.columns == most
