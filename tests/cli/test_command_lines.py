@@ -5,6 +5,7 @@ Oracle: a table of lines and of what each of them asks for.
 
 from __future__ import annotations
 
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -84,3 +85,24 @@ def test_meshes_have_a_length(
 ) -> None:
     assert call(capfd, "view", "J", f"--meshes={value}").code == code
     assert [fields["meshes"] for fields in understood] == [float(value)] * (code == 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "words"),
+    [
+        ("plan", "--rows", "[default: rate; of ROS messages knots]"),
+        ("plan", "--format", "[default: csv]"),
+        ("plan", "--digits", "fixed: nine decimals; full: every bit"),
+        ("check", "--topic", "[default: /joint_states]"),
+        ("explain", "JOB", "- is standard input"),
+        ("fk", "--tool", "POSE T_flange_tcp"),
+        ("fk", "--base", "POSE T_world_base"),
+        ("fk", "--si", "in rad and m"),
+        ("fk", "--digits", "fixed: nine decimals; full: every bit"),
+    ],
+)
+def test_help_says_what_holds(name: str, option: str, words: str, capfd: Capture) -> None:
+    text = " ".join(call(capfd, name, "--help").out.partition("Arguments:")[2].split())
+    beginning = re.search(rf"(?:^|(?:-\w, )| ){option} ", text)
+    assert beginning is not None
+    assert words in text[beginning.start() :][:300]

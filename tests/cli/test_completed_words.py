@@ -13,6 +13,7 @@ from typer.main import get_command
 from trajcli.cli.app import app
 from trajcli.cli.completion import joints_that_begin, paths_that_begin, quantities_that_begin
 from trajcli.cli.options import profile_words, quantity_names, robot_names
+from trajcli.consumers.profile import profile_names
 from trajcli.job.schema import schema_of
 
 JOB = """
@@ -137,6 +138,7 @@ def test_names_behind_commas_are_not_offered_twice(job: str) -> None:
 def test_names_of_robots_and_consumers_are_those_that_begin_so() -> None:
     assert profile_words("ur") == ["ur-passthrough", "ur-servoj"]
     assert profile_words("jtc") == []
+    assert profile_words("") == sorted(profile_names())
     assert robot_names("r5e") == []
     assert robot_names("ur5") == ["ur5", "ur5e"]
 

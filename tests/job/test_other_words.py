@@ -40,6 +40,7 @@ def problems(text: str) -> list[tuple[int, str]]:
         ("duration: 1", "duration: 1, limits: fast", 5, 'got "fast" | its keys: position'),
         ("version: 1", "version: 1\nlimits: {tcp: fast}", 2, 'got "fast" | its keys: speed'),
         ("{joints: 1}", "{name: ur5e, note: x, tool: {xyz: [0, 0, 1]}}", 2, "and `tool` beside `robot` in"),
+        ("{joints: 1}", "true", 2, "got true | such as ur5e: `trajcli robots` lists the names"),
         ("duration: 1", "duration: 1, times: [1]", 5, "{repeat: 3, moves: [...]}"),
         ("to: {", "target: {", 5, "unknown key 'target' | did you mean 'to'?"),
         ("duration: 1", "duration: 1, limits: {accel: 2}", 5, "did you mean 'acceleration'?"),
@@ -89,6 +90,14 @@ def test_what_is_meant_is_said(old: str, new: str, line: int, said: str) -> None
     found = problems(JOB.replace(old, new))
     assert [place for place, _ in found] == [line]
     assert said in found[0][1]
+
+
+def test_an_arm_of_the_catalogue_that_is_given_as_its_own_is_said_at_its_name() -> None:
+    with pytest.raises(InputError) as caught:
+        job_from_text(JOB.replace("{joints: 1}", "{tool: {xyz: [0, 0, 1]}, name: ur5e}"))
+    (problem,) = caught.value.problems
+    assert problem.place is not None
+    assert problem.place.source[problem.place.column - 1 :].startswith("ur5e}")
 
 
 def test_the_name_of_a_point_among_the_moves_is_where_a_move_goes() -> None:
