@@ -21,6 +21,7 @@ from trajcli.cli.plan import (
     _moves,
     _steps,
     _summarise_consumer,
+    peer_lines,
     summary,
     violation_lines,
 )
@@ -382,3 +383,33 @@ def test_what_the_job_was_read_from_stays(option: str, name: str, job: Path, cap
     before = {path: path.read_bytes() for path in Path().iterdir()}
     assert call(capfd, "plan", "job.yaml", option, name).code == 2
     assert {path: path.read_bytes() for path in Path().iterdir()} == before
+
+
+def test_all_that_peers_do_is_said_of_a_move() -> None:
+    def broken(joint: str) -> PeerViolation:
+        return PeerViolation(quantity="velocity", joint=joint, value=3.0, limit=2.0, time=0.0, unit="deg/s")
+
+    use = SimpleNamespace(used=0.5, quantity="velocity", joint="a")
+    beside = SimpleNamespace(duration=2.0, ratio=1.1, own_use=use, use=use, violations=[broken("a")])
+    move = moved()
+    move.path_reference, move.reference = beside, SimpleNamespace(violations=[broken("b")])
+    said = list(peer_lines(move))  # type: ignore[arg-type]
+    assert said[0].startswith("  1.1 x toppra along the same path (2 s)")
+    assert said[1:] == [
+        f"  {peer} breaks a limit: the velocity of {joint} reaches 3 deg/s, its limit is 2"
+        for peer, joint in (("toppra", "a"), ("ruckig", "b"))
+    ]
+    move.path_reference = None
+    assert list(peer_lines(move)) == said[2:]  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("words", "every"), [((), False), (("--all",), True), (("--errors", "github"), True)]
+)
+def test_every_finding_is_told_where_it_is_asked_for_and_to_programs(
+    words: tuple[str, ...], every: bool, job: Path, capfd: Capture
+) -> None:
+    two = FAST.replace("[{velocity: 90}]", "[{velocity: 90}, {velocity: 90}]")
+    job.write_text(two, encoding="utf-8")
+    err = call(capfd, "plan", "job.yaml", "--no-output", *words).err
+    assert [f"the velocity of {name} reaches 225 deg/s" in err for name in ("j1", "j2")] == [True, every]
