@@ -413,3 +413,13 @@ def test_every_finding_is_told_where_it_is_asked_for_and_to_programs(
     job.write_text(two, encoding="utf-8")
     err = call(capfd, "plan", "job.yaml", "--no-output", *words).err
     assert [f"the velocity of {name} reaches 225 deg/s" in err for name in ("j1", "j2")] == [True, every]
+
+
+@pytest.mark.parametrize("words", [(), ("--for", "ros-jtc")])
+def test_a_report_says_how_the_rows_are_joined_and_what_the_consumer_asks_for(
+    words: tuple[str, ...], capfd: Capture
+) -> None:
+    assert call(capfd, "plan", "job.yaml", "-o", "rows.csv", "--report", "r.json", *words).code == 0
+    report = json.loads(Path("r.json").read_text(encoding="utf-8"))
+    assert report["rows"]["verdict"] in ("satisfied", "within rounding")
+    assert (report["consumer"] is not None) == bool(words)
