@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 from typing import Any
 
@@ -130,9 +131,9 @@ def test_of_joined_rows_what_is_just_above_a_limit_is_nothing(rule: str) -> None
     """Certain or not: knots stand in whole nanoseconds. Of a limit of zero there is no share: what is certain counts."""
     near, far = finding(1 + 0.5e-5, rule=rule), finding(1 + 2e-5, rule=rule)
     rounded, nothing = (finding(limit=limit, rule=rule, certainty="within rounding") for limit in (1.0, 0.0))
-    zero, unnamed = (finding(limit=limit, rule=rule) for limit in (0.0, None))
-    found = as_joined(Judgement((near, rounded, far, nothing, zero, unnamed), "cubic", 2)).findings
-    assert found == (far, zero, unnamed)
+    zero, unlimited = finding(limit=0.0, rule=rule), replace(rounded, limit=None)
+    found = as_joined(Judgement((near, rounded, far, nothing, zero, unlimited), "cubic", 2)).findings
+    assert found == (far, zero, unlimited)
 
 
 @pytest.mark.parametrize("limit", [-1.0, 1.0])

@@ -146,9 +146,9 @@ def _cells(motion: EditedMotion, column: WrittenColumn, part: slice) -> Array:
 
 
 def _si_columns(motion: EditedMotion, form: StreamFormat) -> tuple[Column, ...]:
-    """Return the columns of a format in SI: those there are; a log has no qddd."""
-    count, orders = motion.rows.q.shape[1], 3 if form.content == "log" else 4
-    names = [name for name in ORDERS[:orders] if name in motion.quantities]
+    """Return the columns of a format in SI: those there are."""
+    count = motion.rows.q.shape[1]
+    names = [name for name in ORDERS if name in motion.quantities]
     found = [Column("t", quantity=Quantity("time"))]
     for name in names:
         angle = Quantity("angle", JOINT_ORDERS[name])
