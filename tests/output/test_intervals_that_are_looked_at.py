@@ -155,14 +155,14 @@ def test_where_all_is_one_polynomial_nothing_is_judged(stated: int) -> None:
         (("t", "pose"), 6, "linear"),
         (("t", "pose", "twist"), 6, "cubic"),
         (("t", "pose", "twist", "twistd"), 6, "quintic"),
-        (("t", "pose", "twist", "twistd"), 5, "linear"),
+        (("t", "pose", "twist", "twistd"), 5, "quintic"),
         (("t", "pose", "twist", "twistd"), 7, "linear"),
         (("pose",), 6, None),
         (("t", "twist"), 6, None),
     ],
 )
 def test_columns_say_how_rows_are_joined(columns: tuple[Any, ...], joints: int, way: str | None) -> None:
-    """Positions with their derivatives; poses only where there are none, as six rates of a tool tell those of six joints."""
+    """Positions with their derivatives; poses only where there are none, as six rates of a tool tell those of at most six joints."""
     robot = arm(*(Joint(f"j{k}", a=0.1) for k in range(joints)))
     plan = made_plan([1.0], np.zeros((2, 1, joints)), [(1, robot, None)])
     rows = JoinedRows(plan, UniformGrid(1.0, 10.0), columns)
