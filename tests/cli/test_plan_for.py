@@ -12,6 +12,8 @@ import pytest
 from running import call
 from tiers import few
 
+from trajcli.output.delivery.for_consumer import _Search
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FR3 = """\
 version: 1
@@ -306,3 +308,18 @@ moves:
     q1 = [float(line[first]) for line in lines[1:]]
     steps = [abs(b - a) * 1000 for a, b in itertools.pairwise(q1)]
     assert 2.61 < max(steps) < 2.619 + 1e-5
+
+
+def test_rows_over_a_limit_are_refused_where_no_slower_motion_is_found(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ramps of 90 deg/s^2 begin between rows: polynomials through these pass the limit that the ramps keep."""
+    monkeypatch.setattr(_Search, "other_rows", lambda *_: None)
+    monkeypatch.setattr(_Search, "slower", lambda _, first: first)
+    rows = tmp_path / "rows.csv"
+    text = RAMPS.replace("duration: 1", "duration: 2.5, velocity: [45, 15, 5, 1, 1, 1]").replace("120", "91")
+    file = job(tmp_path, text + "when_over_limit: slow\noutput: {rate: 7}\n")
+    code, out, err = call(capfd, "plan", file, "--for", "ros-jtc", "-o", rows)
+    assert (code, out, rows.exists()) == (1, "", False), err
+    assert "error: for ros-jtc at 7 Hz: the acceleration of " in err
+    assert "neither other rows nor a slower motion was found that keeps them" in err

@@ -72,6 +72,26 @@ def test_both_sides_of_a_break_have_their_own_rows(kink, far, order):
         np.testing.assert_array_equal(rows.b[:, 3:], -rows.b[:, :3])
 
 
+def test_points_of_a_finer_grid_have_their_own_rows_and_are_told_once(monkeypatch):
+    """On a straight line neighbours differ by their positions alone, by which gravity and inertia do."""
+    robot, line = random_arm(np.random.default_rng(2), 3), np.array([[[0.7, -0.4, 1.1]], [[0.2, 0.1, -0.3]]])
+    one, other = (
+        constraint(robot, PiecewisePolynomial(np.array([0.0, 1.0]), line), [[-900.0, 900.0]] * 3)
+        for _ in "12"
+    )
+    grids = [np.linspace(0.0, 1.0, count) for count in (5, 17, 9)]
+    fresh = other.rows(grids[1], "right")
+    asked, told = [], InverseDynamics.along_path
+    monkeypatch.setattr(
+        InverseDynamics, "along_path", lambda self, q, *more: asked.append(len(q)) or told(self, q, *more)
+    )
+    for grid, step in zip(grids, (4, 1, 2), strict=True):
+        rows = one.rows(grid, "right")
+        np.testing.assert_allclose(rows.a, fresh.a[::step], rtol=1e-12)
+        np.testing.assert_allclose(rows.c, fresh.c[::step], rtol=1e-12)
+    assert asked == [5, 12], "the third grid is part of the second one"
+
+
 def lifts(side: float, friction: float = 0.0, viscous: float = 0.0) -> Robot:
     """Return two slides along one vertical line, the second of 5 kg, the first of none; gravity may point up."""
     links = (LinkInertia(mass, (0.0, 0.0, 0.0), (0.0,) * 6) for mass in (1e-12, MASS))
