@@ -10,6 +10,8 @@ import pytest
 import ruckig
 
 from trajcli.curves.phases import PhaseChain
+from trajcli.errors import PlanningError
+from trajcli.planners import ruckig as planner
 from trajcli.planners.ruckig import (
     BoundaryProblem,
     PhaseProfile,
@@ -194,6 +196,61 @@ def test_no_motion_is_faster_than_the_fastest() -> None:
         again = fastest_of(asked, 0.5 * made.duration)
         assert again.duration == pytest.approx(made.duration, rel=1e-9)
         assert float(again.curve().evaluate(again.duration)[0]) == pytest.approx(asked.final[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_stretched_motion_is_no_faster_than_the_fastest(sign: float) -> None:
+    """In 1e5 s a millisecond of braking is no finer than rounding leaves it: the fastest is stretched instead."""
+    bounds = np.array([[-1.0, 1.0], [-1e3, 1e3], [-1e6, 1e6]])
+    asked = problem((sign * 1e5, 0, 0), bounds=bounds)
+    made = fastest_of(asked, 5e4)
+    assert made.duration == pytest.approx(1e5 + 2e-3, rel=1e-12)
+    assert np.abs(made.curve().evaluate(np.linspace(0, made.duration, 101), 1)).max() <= 1 + 1e-9
+
+
+@pytest.mark.parametrize("units", [(0.25, 8.0), (8.0, 0.25)])
+@pytest.mark.parametrize(
+    ("first", "last", "longer"),
+    [
+        ((0, -0.3, 0.5), (3, 0.2, 0), None),
+        ((0, -0.3, 0.5), (3, 0.2, 0), 9.0),
+        ((0, 0.5, 0), (0.05, 0.5, 0), 0.12),
+    ],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_units_of_ruckig_change_nothing(
+    sign: float,
+    first: Any,
+    last: Any,
+    longer: float | None,
+    units: tuple[float, float],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Powers of two of time and of length; the last one has to go back first, and lasts longer than is wanted."""
+    asked = problem(sign * np.array(last), sign * np.array(first))
+    as_it_is = fastest(asked) if longer is None else fastest_of(asked, longer)
+    monkeypatch.setattr(planner, "_units", lambda *_: iter([units]))
+    made = fastest(asked) if longer is None else fastest_of(asked, longer)
+    assert made.duration == pytest.approx(as_it_is.duration, rel=1e-12)
+    assert made.chain.durations == pytest.approx(as_it_is.chain.durations, rel=1e-9)
+    assert made.chain.constants == pytest.approx(as_it_is.chain.constants, rel=1e-9)
+
+
+@pytest.mark.parametrize(("misses", "best"), [([2e-9] * 3, None), ([8e-10, 3e-10, 6e-10], 1)])
+def test_of_motions_that_miss_their_target_the_nearest_is_taken_and_none_that_jumps(
+    misses: list[float], best: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A billionth of the peaks is a jump that verification would find."""
+    found = iter([(PhaseProfile(0.0, PhaseChain((), (), (), ()), k), miss) for k, miss in enumerate(misses)])
+    monkeypatch.setattr(planner, "_attempts", lambda *_: [(0.0, (1.0, 1.0))] * len(misses))
+    monkeypatch.setattr(planner, "_corrected", lambda *_: next(found))
+    monkeypatch.setattr(planner, "_within", lambda *_: True)
+    asked = problem((3, 0.2, 0))
+    if best is None:
+        with pytest.raises(PlanningError, match="no motion within"):
+            fastest(asked)
+    else:
+        assert fastest(asked).duration == best
 
 
 def test_all_last_as_long_as_the_slowest_and_the_minimum() -> None:
