@@ -164,7 +164,8 @@ def test_set_and_rate(job: Path, capfd: Capture) -> None:
 
 
 def test_the_resolved_job(job: Path, capfd: Capture) -> None:
-    rows = call(capfd, "plan", job, "--set", "name=x", "--resolved", "resolved.yaml").out
+    rows = call(capfd, "plan", job, "--set", "name=x", "--rate", "4", "--resolved", "resolved.yaml").out
+    assert len(rows.splitlines()) == 1 + 5
     assert "name: x\n" in Path("resolved.yaml").read_text()
     assert call(capfd, "plan", "resolved.yaml").out == rows
     text = call(capfd, "plan", "resolved.yaml", "--no-output", "--resolved", "-").out

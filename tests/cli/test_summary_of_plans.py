@@ -112,6 +112,13 @@ def test_rows_have_the_digits_with_which_they_were_judged(job: Path, capfd: Capt
     for k in (1, 2, 7):
         s = k / 3000
         assert values[k] == pytest.approx(30 * s**3 * (10 - 15 * s + 6 * s**2), rel=1e-13)
+    assert "every bit" not in call(capfd, *words[:-1], "rows.mcap").err, "a log has every bit of all numbers"
+    for rate, digits, exact in (("1000", "fixed", False), ("100", "full", True)):
+        said = call(capfd, "plan", "job.yaml", "--for", "ros-jtc", "--rate", rate, "--digits", digits)
+        assert "every bit" not in said.err, "it was asked for"
+        (q,) = [float(row["q1_deg"]) for k, row in enumerate(csv.DictReader(said.out.splitlines())) if k == 7]
+        s = 7 / (3 * float(rate))
+        assert (abs(q - 30 * s**3 * (10 - 15 * s + 6 * s**2)) < 1e-14) == exact
 
 
 RAMPS = JOB.replace("quintic, to: {joints: 30}, duration: 1", "trapezoid, to: {joints: 30}")
@@ -342,19 +349,24 @@ def test_corners_flown_by_save_a_part_of_the_time_with_stops() -> None:
     assert _flown(flyby) == text  # type: ignore[arg-type]
     one = SimpleNamespace(zones=(1,), duration=7.5, stopping=10.0, second_order=None)
     assert _flown(one) == "flies by 1 corner: 25 % less than the 10 s of stopping there"  # type: ignore[arg-type]
+    none = SimpleNamespace(zones=(), duration=10.0, stopping=10.0, second_order=None)
+    plan = plan_job(load_job("job.yaml"))
+    for corners, said in ((flyby, [f"  {text}"]), (none, []), (None, [])):
+        lines = summary(replace(plan, flyby=corners), 0).splitlines()  # type: ignore[arg-type]
+        assert [line for line in lines if "flies by" in line] == said
 
 
 def test_what_is_not_checked_is_named(capfd: Capture) -> None:
-    """What has no limit, by the job; what is only sampled, by the report."""
-    assert (
-        "  without a limit, not checked: position, acceleration, jerk\n"
-        in call(capfd, "plan", "job.yaml").err
-    )
+    """What has no limit, by the job; what is only sampled, by the report. 30 deg in 1 s: 15/8 of 30 deg/s of 90."""
+    err = call(capfd, "plan", "job.yaml").err
+    assert "  without a limit, not checked: position, acceleration, jerk\n" in err
+    assert "  tightest limit: velocity of j1 in move 0, 62.5 % used\n" in err
     err = call(capfd, "plan", EXAMPLES / "line.yaml", "--no-output", "--report", "r.json").err
     (line,) = [line for line in err.splitlines() if line.startswith("  on samples only: branch, moves ")]
     moves = json.loads(Path("r.json").read_text(encoding="utf-8"))["moves"]
     along = [move["index"] for move in moves if move["tool"] is not None]
     assert len(along) == 5
+    assert {(move["reference"], move["path_reference"]) for move in moves} == {(None, None)}, "not asked for"
     assert line.endswith(f" {', '.join(map(str, along))}")
     tool = ("--set", "limits.tcp.speed=1", "--set", "limits.tcp.angular_speed=1")
     text = "  limited, but not checked in every move: speed, angular speed of the tool\n"
