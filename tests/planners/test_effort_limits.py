@@ -11,7 +11,12 @@ from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, time_optimal
 from trajcli.errors import PlanningError
 from trajcli.kinematics.robot import Friction, Joint, Limits, LinkInertia, Robot, unlimited
-from trajcli.planners.effort_limits import effort_shares, lacks_acceleration, solved_within_efforts
+from trajcli.planners.effort_limits import (
+    effort_constraints,
+    effort_shares,
+    lacks_acceleration,
+    solved_within_efforts,
+)
 
 MASS, G, FREE = 5.0, 9.81, np.inf
 SIDES = pytest.mark.parametrize("side", [1.0, -1.0])
@@ -134,3 +139,42 @@ def test_who_is_held_over_its_limit_is_told_by_how_much(friction: float, cause: 
     text = str(caught.value)
     assert f"{cause} alone takes {side * needed:.6g} N of lift" in text
     assert f": {needed - 48.0:.6g} N more than its effort limit of {side * 48.0:g} N" in text
+
+
+def test_the_place_where_a_beam_is_held_over_its_limit_is_told() -> None:
+    """It turns from -1 to 1 rad, and is level at 0, in the middle of its path."""
+    link = LinkInertia(MASS, (0.0, 0.0, 0.0), (0.0,) * 6)
+    limits = replace(unlimited(1), effort=np.array([[-900.0, 48.0]]))
+    gravity = np.array([0.0, -G, 0.0])
+    joints = (Joint("beam", "revolute", a=1.0, link=link),)
+    robot = Robot("beam", joints, limits, "standard", np.eye(4), np.eye(4), gravity=gravity)
+    turn = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([2.0, -1.0])[:, None, None])
+
+    def solve(more: tuple) -> TimeOptimalMotion:
+        return more[0].rows(np.linspace(0.0, 1.0, 5), "right")
+
+    with pytest.raises(PlanningError) as caught:
+        solved_within_efforts(turn, robot, solve)
+    assert "with the joints at 0: 1.05 N m more" in str(caught.value)
+
+
+@SIDES
+def test_a_limit_that_was_lowered_is_not_said_to_be_that_of_a_joint(side: float) -> None:
+    """49.05 of 50 N hold it; a solution that takes 54.05 N asks for a limit of 44 N, which is nobody's."""
+    robot = lift([-900.0, 50.0] if side > 0 else [-50.0, 900.0], side * G)
+    ends = {"start_velocity": 0.5, "end_velocity": 0.5}
+    over = time_optimal(path(side), [[-FREE, FREE]], [[-1.0, 1.0]], **ends)
+
+    def solve(more: tuple) -> TimeOptimalMotion:
+        more[0].rows(np.array([0.0, 1.0]), "right")
+        return over
+
+    assert solved_within_efforts(path(side), robot, solve) is over
+
+
+def test_the_constraint_of_efforts_is_of_the_limits_in_force() -> None:
+    robot = lift([-50.0, 40.0])
+    robot = replace(robot, limits=replace(robot.limits, velocity=np.array([[-2.0, 3.0]])))
+    (constraint,) = effort_constraints(path(), robot)
+    assert constraint.velocity.tolist() == [[-2.0, 3.0]]
+    assert constraint.limits.tolist() == [[-50.0, 40.0]]
