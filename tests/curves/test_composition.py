@@ -56,6 +56,17 @@ def test_every_passing_of_a_break_becomes_a_break():
     np.testing.assert_allclose(found.breaks, expected, atol=1e-14)
 
 
+def test_each_piece_of_a_law_passes_its_own_breaks():
+    """A path with a corner at 1 and at 2; each of the two pieces of the law passes one of them in its middle."""
+    slopes, places = np.array([1.0, -2.0, 5.0]), np.array([0.0, 1.0, -1.0])
+    path = PiecewisePolynomial([0.0, 1.0, 2.0, 3.0], np.stack([slopes, places])[:, :, None])
+    law = PiecewisePolynomial([0.0, 0.75, 1.5], np.array([[2.0, 2.0], [0.0, 1.5]])[:, :, None])
+    found = compose(path, law)
+    np.testing.assert_allclose(found.breaks, [0.0, 0.5, 0.75, 1.0, 1.5], atol=1e-15)
+    t = np.linspace(0.0, 1.5, 31)
+    np.testing.assert_allclose(found.evaluate(t), path.evaluate(np.minimum(2.0 * t, 3.0)), atol=1e-14)
+
+
 def test_breaks_that_meet_up_to_rounding_stay_one():
     places = np.array([0.0, 0.1, 0.2, 0.30000000000000004, 1.0])
     path = PiecewisePolynomial(places, np.ones((3, 4, 1)))
@@ -82,7 +93,7 @@ def test_what_cannot_be_composed_is_named():
     law = PiecewisePolynomial([0.0, 1.0], np.array([0.0, 0.0, 1.0, 0.0])[:, None, None])
     with pytest.raises(ValueError, match="at most 10"):
         compose(path, law)
-    with pytest.raises(ValueError, match="dimension 2"):
+    with pytest.raises(ValueError, match="dimension 2: dimension 1 and a product"):
         compose(path, constant([0.5, 0.5], 1.0))
     with pytest.raises(ValueError, match=r"the law runs from 0\.0 to 1\.5"):
         compose(path, PiecewisePolynomial([0.0, 1.5], np.array([1.0, 0.0])[:, None, None]))

@@ -11,6 +11,7 @@ from scipy.interpolate import PPoly
 from trajcli.curves.operations import (
     along_line,
     coast_until,
+    cut,
     hold_until,
     merge_breaks,
     reverse,
@@ -164,7 +165,17 @@ def test_coasting_curve_keeps_its_last_velocity():
 def test_extension_never_shortens(extend):
     with pytest.raises(ValueError, match="after"):
         extend(constant([1.0], 2.0), 1.9)
-    assert extend(constant([1.0], 2.0), np.nextafter(2.0, 3.0)).pieces == 1
+    for end in (1.0, 3.0):
+        assert extend(constant([1.0], 2.0), np.nextafter(2.0, end)).pieces == 1
+    for end in (0.3 / np.arange(1.0, 40.0)).tolist():
+        assert extend(constant([1.0], 0.1 * end), end).end == end, "to the last bit"
+
+
+def test_a_curve_is_held_by_its_velocity_at_its_end():
+    starting, stopping = (np.array(rows)[:, None, None] for rows in ([1.0, 0.0, 0.0], [-1.0, 2.0, 0.0]))
+    with pytest.raises(ValueError, match="still moves at its end"):
+        hold_until(PiecewisePolynomial([0.0, 1.0], starting), 2.0)
+    assert hold_until(PiecewisePolynomial([0.0, 1.0], stopping), 2.0).evaluate(2.0).tolist() == [1.0]
 
 
 def test_joined_extension_evaluates_over_all():
@@ -188,7 +199,7 @@ def test_rounding_of_times_before_zero_is_that_of_the_earliest():
 def test_breaks_a_last_bit_apart_stay_apart_in_scaled_and_reversed_time():
     breaks = [0.0, 0.1, np.nextafter(0.1, 1), 1.9, np.nextafter(1.9, 2), 10.0]
     curve = PiecewisePolynomial(breaks, np.ones((2, 5, 1)))
-    for other in (reverse(curve), scale_time(curve, 1.06)):
+    for other in (reverse(curve), scale_time(curve, 1.06), scale_time(curve.shifted(8.0), 0.05)):
         assert other.pieces == 5
         assert (other.lengths > 0).all()
 
@@ -211,3 +222,26 @@ def test_a_curve_rests_where_its_velocity_is_rounding(peaks, rates, moves):
             hold_until(curve, 3.0)
     else:
         assert hold_until(curve, 3.0).end == 3.0
+
+
+@pytest.mark.parametrize("time", [-1.3, -0.5, 1.0, 1.0 + 2e-16, 2.5])
+def test_both_parts_of_a_curve_that_is_cut_are_the_curve(time):
+    """Inside a piece it has a break more; at a break, or beside one by rounding alone, as many as before."""
+    curve = PiecewisePolynomial([-2.0, -0.5, 1.0, 3.0], np.random.default_rng(3).normal(size=(4, 3, 2)))
+    before, behind = cut(curve, time)
+    assert before.pieces + behind.pieces == (4 if time in (-1.3, 2.5) else 3)
+    assert (before.start, behind.end) == (-2.0, 3.0)
+    assert before.end == behind.start == pytest.approx(time, abs=1e-15)
+    for part in (before, behind):
+        t = np.linspace(part.start, part.end, 13)[1:-1]
+        for order in range(4):
+            np.testing.assert_allclose(
+                part.evaluate(t, order), curve.evaluate(t, order), rtol=1e-11, atol=1e-11
+            )
+
+
+@pytest.mark.parametrize("time", [-2.0, -2.0 + 1e-16, 3.0, -5.0, 7.0])
+def test_a_curve_is_cut_where_something_is_left_of_both_parts(time):
+    curve = PiecewisePolynomial([-2.0, 1.0, 3.0], np.ones((2, 2, 1)))
+    with pytest.raises(ValueError, match=r"is no time within \[-2\.0, 3\.0\]"):
+        cut(curve, time)
