@@ -19,6 +19,7 @@ from trajcli.kinematics.inverse.self_motion import (
 )
 from trajcli.kinematics.inverse.target import partial_target, pose_target
 from trajcli.kinematics.jacobian import jacobian
+from trajcli.kinematics.robot import Robot
 
 FULL = 2 * np.pi
 
@@ -185,6 +186,21 @@ def test_a_slide_knows_no_full_turns(slide, kept) -> None:
     assert np.flatnonzero(found[0]).tolist() == ([0] if slide == 0.2 else [1])
 
 
+def missed(robot: Robot, ends: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far ends are from being nearest, by Karush, Kuhn and Tucker, and which are pressed against limits.
+
+    What is left of the way is a sum of rows of the Jacobian and of what presses joints against their limits.
+    """
+    low, high = robot.limits.position.T
+    pressed = 1.0 * (ends >= high - 1e-9) - 1.0 * (ends <= low + 1e-9)
+    least = np.concatenate([np.full(3, -np.inf), np.zeros(len(low))])
+    every = zip(near - ends, jacobian(robot, ends)[:, :3], pressed, strict=True)
+    costs = [
+        lsq_linear(np.hstack([slopes.T, np.diag(p)]), gap, (least, np.inf)).cost for gap, slopes, p in every
+    ]
+    return np.array(costs), pressed.any(axis=1)
+
+
 @pytest.mark.parametrize("narrow", [False, True])
 @pytest.mark.parametrize("name", ["planar 3R", "elbow, pitch and roll"])
 def test_what_is_left_of_the_way_to_the_nearest_point_is_across_the_self_motion_or_over_a_limit(
@@ -209,14 +225,22 @@ def test_what_is_left_of_the_way_to_the_nearest_point_is_across_the_self_motion_
         np.testing.assert_allclose(turned, ends + FULL, rtol=0, atol=1e-6)
     assert (ends >= low).all()
     assert (ends <= high).all()
-    held = 0
-    for end, gap, slopes in zip(ends, near - ends, jacobian(robot, ends)[:, :3], strict=True):
-        pressed = np.where(end >= high - 1e-9, 1.0, 0.0) - np.where(end <= low + 1e-9, 1.0, 0.0)
-        columns = np.hstack([slopes.T, np.diag(pressed)])
-        least = np.concatenate([np.full(3, -np.inf), np.zeros(len(end))])
-        assert lsq_linear(columns, gap, (least, np.inf)).cost <= 1e-12
-        held += bool(pressed.any())
+    costs, pressed = missed(robot, ends, near)
+    assert (costs <= 1e-12).all()
+    held = np.count_nonzero(pressed)
     assert held >= 4 if narrow else held == 0
+
+
+def test_between_limits_no_step_ends_beyond_one_of_either_side() -> None:
+    """Far from where they aim, joints run against a limit in nearly every step."""
+    robot, rng = arm("elbow, pitch and roll"), np.random.default_rng(1)
+    q = 0.7 + rng.uniform(-0.1, 0.1, (40, len(robot.joints)))
+    near = q + rng.uniform(-2.0, 2.0, q.shape)
+    bounds = np.tile([0.6, 0.8], (len(robot.joints), 1))
+    robot = replace(robot, limits=replace(robot.limits, position=bounds))
+    ends = nearest_on_self_motions(robot, partial_target(forward(robot, q)[:, :3, 3]), q, near)
+    costs, _ = missed(robot, ends, near)
+    assert (costs <= 1e-12).all()
 
 
 @pytest.mark.parametrize(

@@ -214,7 +214,7 @@ def test_a_stretched_motion_is_no_faster_than_the_fastest(sign: float) -> None:
     [
         ((0, -0.3, 0.5), (3, 0.2, 0), None),
         ((0, -0.3, 0.5), (3, 0.2, 0), 9.0),
-        ((0, 0.5, 0), (0.05, 0.5, 0), 0.12),
+        ((0, 0.5, 0), (0.05, 0.5, 0), 0.3),
     ],
 )
 @pytest.mark.parametrize("sign", [1.0, -1.0])
