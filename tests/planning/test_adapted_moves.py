@@ -11,10 +11,12 @@ import pytest
 
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
-from trajcli.planners.planner import Planned
+from trajcli.planners.planner import Event, Planned, PlannedMove
 from trajcli.planners.point_to_point.jerk_limited import JerkLimited
+from trajcli.planning import planned_move
 from trajcli.planning.adaptation import Adaptation, proportions, without_bounds
 from trajcli.planning.plan import plan_job
+from trajcli.planning.retime import with_duration
 from trajcli.trajectory import resting
 
 BOTH = np.array([[-2.0, 4.0], [-np.inf, 3.0]])
@@ -123,3 +125,33 @@ def test_breaks_on_rows_are_given_up_where_another_law_is_as_fast(monkeypatch: p
     assert made.verdict.passed
     assert made.trajectory.duration == pytest.approx(plan_job(loaded).trajectory.duration, rel=1e-12)
     assert len(asked) == 1
+
+
+def test_breaks_on_rows_are_asked_for_as_late_as_all_limits_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another limit asks for a fifth more at a time, up to 2.5 s; rows of 0.4 s give 2.8 s, and all is still said."""
+    joint = {"velocity": 9, "acceleration": 4, "jerk": 99}
+    job = {"version": 1, "robot": {"joints": 1}, "limits": joint, "start": {"joints": [0]}}
+    loaded = job_from_text(
+        json.dumps(
+            {**job, "moves": [{"planner": "jerk_limited", "to": {"joints": [0.5]}, "minimum_duration": 1}]}
+        )
+    )
+    (move,) = plan_job(loaded).moves
+    said = (Event("slowed", "it is so", 0),)
+    move = replace(move, planned=replace(move.planned, events=said))
+    asked: list[float] = []
+
+    def on_rows(own: JerkLimited, start: Any, robot: Any, period: float, least: float) -> Planned:
+        asked.append(least)
+        return replace(with_duration(move, period * np.ceil(least / period - 1e-9)).planned, events=())
+
+    def within(other: PlannedMove) -> PlannedMove:
+        return other if other.duration >= 2.5 else with_duration(other, min(1.2 * other.duration, 2.5))
+
+    monkeypatch.setattr(JerkLimited, "on_rows", on_rows)
+    monkeypatch.setattr(planned_move, "_within_limits", within)
+    made = planned_move._on_rows(move, 0.4)
+    assert made is not None
+    assert asked == pytest.approx([1.0, 1.44, 1.92, 2.4, 2.5])
+    assert made.duration == pytest.approx(2.8)
+    assert made.planned.events == said

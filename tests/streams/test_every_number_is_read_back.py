@@ -143,6 +143,17 @@ def test_every_state_of_a_log_is_read_back() -> None:
                     verify_mcap(out, in_blocks(other, *sizes), columns, recording)
 
 
+def test_a_log_is_read_back_by_its_format_and_with_its_own_recording() -> None:
+    rows, columns, recording, out = log()
+    _, verify = FORMATS["mcap"].functions(WriteOptions(recording=lambda: recording))
+    verify(out, in_blocks(rows), columns)
+    with pytest.raises(TrajcliError, match="read back"):
+        verify(out, in_blocks(rows + 1e-3), columns)
+    _, verify = FORMATS["mcap"].functions(WriteOptions(recording=lambda: replace(recording, metadata={})))
+    with pytest.raises(TrajcliError, match="read back"):
+        verify(out, in_blocks(rows), columns)
+
+
 def test_a_log_of_other_columns_does_not_agree() -> None:
     rows, columns, recording, out = log()
     without = [k for k, column in enumerate(columns) if column.kind != "tau"]

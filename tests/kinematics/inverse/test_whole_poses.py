@@ -10,9 +10,11 @@ from inverse_arms import arm, random_joints
 from scipy.spatial.transform import Rotation
 
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse import partial_targets
 from trajcli.kinematics.inverse.answers import Answers, closures
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
+from trajcli.kinematics.inverse.numeric import SearchResult
 from trajcli.kinematics.inverse.partial_targets import (
     SAMPLES,
     Postures,
@@ -317,6 +319,24 @@ def test_a_posture_that_no_sample_meets_is_sought_and_a_target_that_none_does_is
         axis=1
     )
     np.testing.assert_allclose(best, theirs, rtol=0, atol=1e-7)
+
+
+def test_what_no_refinement_meets_is_searched_for_from_where_the_arm_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """But for a target that is met already; one seed meets the last target, the other one that before."""
+    own, answers, q, _ = reduction("UR", "direction", "z", 1, 0.02)
+    own._offer(answers, np.array([0]), q[[0]])
+    met = np.array([[False, True], [True, False]])
+    found = SearchResult(np.where(met[..., None], q[1:, None], 0.5), met)
+    looked: list[np.ndarray] = []
+    monkeypatch.setattr(partial_targets, "refine", lambda robot, target, start, rounds: start)
+    monkeypatch.setattr(partial_targets, "search", lambda *given: looked.append(given[2]) or found)
+    own.fill_missing(answers)
+    assert [near.tolist() for near in looked] == [own.near[1:].tolist()]
+    posture = own.postures.of(q)
+    assert np.argwhere(answers.valid.T).tolist() == [[row, posture[row]] for row in range(3)]
+    np.testing.assert_allclose(answers.joints[:, posture, range(3)].T, q, rtol=0, atol=1e-12)
 
 
 def test_indices_that_come_twice_are_taken_one_after_the_other() -> None:
