@@ -303,6 +303,7 @@ moves:
     rows, slow = tmp_path / "rows.csv", job(tmp_path, text + "when_over_limit: slow\n")
     code, _, err = call(capfd, "plan", slow, "--for", "franka-fr3", "-o", rows)
     assert code == 0, err
+    assert "for franka-fr3: all necessary rules are kept" in err
     lines = [line.split(",") for line in rows.read_text().splitlines()]
     first = lines[0].index("q1")
     q1 = [float(line[first]) for line in lines[1:]]
@@ -310,15 +311,18 @@ moves:
     assert 2.61 < max(steps) < 2.619 + 1e-5
 
 
-def test_rows_over_a_limit_are_refused_where_no_slower_motion_is_found(
+def test_rows_over_a_limit_are_others_or_of_a_slower_motion_or_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Ramps of 90 deg/s^2 begin between rows: polynomials through these pass the limit that the ramps keep."""
-    monkeypatch.setattr(_Search, "other_rows", lambda *_: None)
-    monkeypatch.setattr(_Search, "slower", lambda _, first: first)
     rows = tmp_path / "rows.csv"
     text = RAMPS.replace("duration: 1", "duration: 2.5, velocity: [45, 15, 5, 1, 1, 1]").replace("120", "91")
     file = job(tmp_path, text + "when_over_limit: slow\noutput: {rate: 7}\n")
+    code, _, err = call(capfd, "plan", file, "--for", "ros-jtc", "-o", rows)
+    assert (code, "job: verified, 1 move, 2.5 s, " in err, "  other_rows: " in err) == (0, True, True), err
+    rows.unlink()
+    monkeypatch.setattr(_Search, "other_rows", lambda *_: None)
+    monkeypatch.setattr(_Search, "slower", lambda _, first: first)
     code, out, err = call(capfd, "plan", file, "--for", "ros-jtc", "-o", rows)
     assert (code, out, rows.exists()) == (1, "", False), err
     assert "error: for ros-jtc at 7 Hz: the acceleration of " in err

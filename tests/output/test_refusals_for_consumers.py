@@ -15,9 +15,10 @@ from trajcli.errors import InputError, VerificationError
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.output.consumer import job_for
 from trajcli.output.delivery.delivered import delivered
-from trajcli.output.delivery.for_consumer import ForConsumer, Writing, _Search, plan_for, refusal
+from trajcli.output.delivery.for_consumer import ForConsumer, Writing, _Search, plan_for, refusal, rows_for
 from trajcli.output.write import grid_of
 from trajcli.planning.plan import plan_job
+from trajcli.streams.decimals import Digits
 
 ONE: dict[str, Any] = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0]}}
 SEPTIC = [{"planner": "septic", "to": {"joints": [1]}, "duration": 1}]
@@ -152,6 +153,7 @@ def test_a_rule_that_no_slowness_keeps_is_refused_where_it_is_broken(when: str, 
     for error in (refusal(made, ()), delivery.value):
         (problem,) = error.problems
         assert (problem.kind, problem.move, problem.severity) == ("jtc-last-velocity", 1, "error")
+        assert problem.message.startswith("jtc-last-velocity: ")
         assert problem.time == pytest.approx(end, abs=1e-9)
         assert problem.place == loaded.place_of_move(1)
     assert delivery.value.problems[0].hint == "end at rest, with a last velocity of exactly 0.0"
@@ -177,6 +179,25 @@ def test_a_rule_that_slowness_keeps_is_refused_in_the_move_that_breaks_it(begins
     assert problem.place == loaded.place_of_move(1)
     assert problem.value == pytest.approx(speed, rel=1e-3)
     assert problem.time == pytest.approx(2.0 + turns[1][1] / 2, abs=0.02)
+
+
+@pytest.mark.parametrize(("digits", "broken"), [("fixed", True), ("full", False)])
+def test_rules_are_of_numbers_as_they_are_written(digits: Digits, broken: bool) -> None:
+    """A cubic of D in N ms begins with D (3 / N^2 - 2 / N^3): 4.9996 um, of which nine decimals make 5 um, and jerk of it."""
+    count = 700
+    distance = 4.9996e-6 / (3 / count**2 - 2 / count**3)
+    arm = [0, -0.3, 0, -2, 0, 1.8, 0.5]
+    move = {"planner": "cubic", "to": {"joints": [distance, *arm[1:]]}, "duration": count / 1000}
+    job = {
+        "robot": "fr3",
+        "start": {"joints": arm},
+        "limits": {"jerk": None, "acceleration": 20},
+        "moves": [move],
+    }
+    loaded, profile, _ = job_for(read(job), "franka-fr3", {})
+    made = rows_for(plan_job(loaded), profile, Writing(digits=digits))
+    assert made.plan.verdict.passed
+    assert ("fr3-jerk" in [found.rule for found in made.over]) is broken
 
 
 def test_what_a_consumer_brings_goes_before_the_job_where_it_is_asked_for_and_behind_where_the_job_names_it() -> (
