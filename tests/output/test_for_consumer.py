@@ -346,3 +346,21 @@ def test_a_motion_through_zones_is_no_slower_for_a_consumer_than_one_that_stops(
     assert grid_of(made.plan).count == made.grid.count
     alone = [plan_job(job_from_text(json.dumps(CORNER | {"zone": {"joints": zone}}))) for zone in (0.05, 0.0)]
     assert alone[0].trajectory.duration < 0.99 * alone[1].trajectory.duration, "between its rows it is faster"
+
+
+@pytest.mark.full
+def test_what_a_corner_flown_by_saves_is_told_by_the_rows_of_a_motion_that_stops() -> None:
+    """Rows of whole periods make both a little longer: as often as not by another number of periods."""
+    moves = [{"planner": "jerk_limited", "to": {"joints": to + [0] * 4}} for to in ([0.5, 0.2], [0.2, 0.7])]
+    job = {**CORNER, "robot": {"joints": 6}, "start": {"joints": [0] * 6}, "moves": moves, "output": {}}
+    job["limits"] = {"velocity": 3, "acceleration": 8, "jerk": 60}
+    made, stopping = (
+        plan_for(*job_for(job_from_text(json.dumps(job | zone)), "ur-servoj", {}), Writing())
+        for zone in ({"zone": {"joints": 0.2}}, {})
+    )
+    assert made.plan.flyby is not None
+    assert len(made.plan.flyby.zones) == 1
+    assert (
+        made.plan.flyby.stopping == stopping.duration == pytest.approx(round(500 * stopping.duration) / 500)
+    )
+    assert made.duration < stopping.duration
