@@ -22,9 +22,10 @@ V, A, FAR = 2.0, 5.0, 1e4
 
 def planned(to: list[float], law: dict[str, Any] | None = None, **limits: Any) -> Planned:
     """Return how a line of the tool from the origin is planned, with a law time_optimal."""
+    load = "{mass: 5, com: [0, 0, 0], inertia: [0, 0, 0, 0, 0, 0]}"
     slides = [
-        {"name": "x", "type": "prismatic", "alpha": 90, "theta": 90},
-        {"name": "y", "type": "prismatic"},
+        {"name": "x", "type": "prismatic", "alpha": 90, "theta": 90, "link": yaml.safe_load(load)},
+        {"name": "y", "type": "prismatic", "link": yaml.safe_load(load)},
     ]
     job = {
         "version": 1,
@@ -78,6 +79,8 @@ def test_a_law_that_lasts_longer_is_the_fastest_slowed_down() -> None:
         made = planned([1.8, 0], {"minimum_duration": least})
         assert made.curve.duration == pytest.approx(factor * fast.curve.duration)
         assert made.law is None or made.law.duration == pytest.approx(made.curve.duration)
+        assert made.phase_plane is not None
+        assert made.phase_plane.law.duration == pytest.approx(made.curve.duration)
         assert made.tool is not None
         assert made.tool.law.duration == pytest.approx(made.curve.duration)
         assert [(phase.name, phase.joint) for phase in made.phases] == [
@@ -89,6 +92,17 @@ def test_a_law_that_lasts_longer_is_the_fastest_slowed_down() -> None:
         assert [phase.start for phase in made.phases] == pytest.approx(ends[:-1], abs=0.01)
         assert [phase.end for phase in made.phases] == pytest.approx(ends[1:], abs=0.01)
         assert ("bound" in {event.kind for event in made.events}) is (factor == 1.0)
+
+
+def test_phases_in_which_a_force_binds_are_named_by_it() -> None:
+    """A slide across gravity, of 5 kg with 10 N: 2 m/s^2."""
+    made = planned([0, 3.0], effort=[1e4, 10.0])
+    assert [(phase.name, phase.joint) for phase in made.phases] == [
+        ("effort +", 1),
+        ("velocity +", 1),
+        ("effort -", 1),
+    ]
+    assert made.curve.duration == pytest.approx(trapezoid(3.0, V, 2.0), rel=1e-3)
 
 
 @pytest.mark.parametrize(
