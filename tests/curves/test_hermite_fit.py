@@ -211,6 +211,10 @@ def test_the_place_of_a_misfit_is_where_it_is_worst():
     with pytest.raises(FitError) as caught:
         fit(known(hump), within(1e-4), ENDS, lambda t: np.zeros((t.size, 1)), at_most=1)
     assert caught.value.at == pytest.approx(1.5 + 0.3 * np.sqrt(5), abs=1e-12)
+    with pytest.raises(FitError) as caught:
+        fit(known(hump), within(1e-4), np.array([0.0, 1.0, 3.0]), lambda t: np.zeros((t.size, 1)), at_most=2)
+    assert caught.value.at > 1.0
+    assert caught.value.misfit > 100.0, "that of the piece with the hump"
 
 
 def test_the_number_of_pieces_is_bounded():
