@@ -6,7 +6,7 @@ TRAJCLI_TEST_TIER names the tier: quick where it is not set, full in `make check
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TypeVar
 
 TIER = os.environ.get("TRAJCLI_TEST_TIER", "quick")
@@ -14,11 +14,12 @@ QUICK = {"quick": True, "full": False, "soak": False}[TIER]
 T = TypeVar("T")
 
 
-def few(cases: Sequence[T], count: int = 6) -> Sequence[T]:
+def few(cases: Collection[T], count: int = 6) -> Sequence[T]:
     """Return all cases, or so many in the quick tier: the first, and others spread over the rest."""
-    if not QUICK or len(cases) <= count:
-        return cases
-    return [cases[number * len(cases) // count] for number in range(count)]
+    listed = cases if isinstance(cases, Sequence) else list(cases)
+    if not QUICK or len(listed) <= count:
+        return listed
+    return [listed[number * len(listed) // count] for number in range(count)]
 
 
 def few_examples(count: int) -> int:

@@ -54,7 +54,7 @@ def test_rows_hold_no_summary_where_standard_error_is_closed(folder: Path, rows:
 
 
 @pytest.mark.parametrize(
-    "words", few(["plan job.yaml", "--help", "--version", "fk --help", "robots ur5e", "schema"], 5)
+    "words", few(["plan job.yaml", "--help", "--version", "fk --help", "robots ur5e", "schema"], 2)
 )
 @pytest.mark.parametrize("stream", ["&-", "/dev/full"])
 def test_a_closed_or_full_standard_output_is_4(folder: Path, words: str, stream: str) -> None:

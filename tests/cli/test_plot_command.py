@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from running import EXAMPLES, FAST, JOB, call, run, warm
+from tiers import few
 
 Capture = pytest.CaptureFixture[str]
 
@@ -31,7 +32,9 @@ def test_a_picture_is_called_as_the_first_file_and_stands_in_this_folder(here: P
     assert call(capfd, "plot", "rows.csv", "job.yaml").err == "job.svg written\n"
 
 
-@pytest.mark.parametrize(("name", "begins"), [("a.svg", b"<?xml"), ("a.png", b"\x89PNG"), ("a.PDF", b"%PDF")])
+@pytest.mark.parametrize(
+    ("name", "begins"), few([("a.svg", b"<?xml"), ("a.png", b"\x89PNG"), ("a.PDF", b"%PDF")], 2)
+)
 def test_the_ending_says_the_format(name: str, begins: bytes, here: Path, capfd: Capture) -> None:
     assert call(capfd, "plot", "job.yaml", "-o", name).code == 0
     assert (here / name).read_bytes().startswith(begins)

@@ -176,7 +176,7 @@ def test_one_robot_as_data(arms):
     assert arms.json("robots", "panda")["ik"]["family"] == "joint 7 held"
 
 
-@pytest.mark.parametrize("name", catalogue_names())
+@pytest.mark.parametrize("name", few(catalogue_names(), 23))
 def test_one_robot_in_words(arms, name):
     code, out, err = arms.call("robots", name)
     assert (code, err) == (0, "")

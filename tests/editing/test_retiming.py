@@ -367,6 +367,7 @@ output: {rate: 100, columns: [t, q, qd, qdd, tau, move]}
 """
 
 
+@pytest.mark.full
 def test_rows_without_moves_carry_what_the_moves_at_their_times_do(tmp_path: Path) -> None:
     """The peer are the same rows with their moves; and as often as the load differs, it must be known."""
     (tmp_path / "job.yaml").write_text(LIFT)

@@ -45,6 +45,7 @@ def assert_same(a: LoadedJob, b: LoadedJob) -> None:
     assert list(map(fields_of, a.job.moves)) == list(map(fields_of, b.job.moves))
 
 
+@pytest.mark.full
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(jobs())
 def test_load_dump_load_is_identity(plain: dict[str, Any]) -> None:
@@ -55,7 +56,7 @@ def test_load_dump_load_is_identity(plain: dict[str, Any]) -> None:
     assert dump_job(second) == text
 
 
-@pytest.mark.parametrize("example", few(EXAMPLES, 12), ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", few(EXAMPLES, 3), ids=lambda path: path.stem)
 def test_the_resolved_example_gives_the_same_curve(example: Path) -> None:
     first = load_job(example)
     second = job_from_text(dump_job(first))

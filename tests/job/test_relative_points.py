@@ -129,6 +129,7 @@ def test_a_flaw_of_a_point_is_not_said_again_by_those_relative_to_it(flawed: str
     assert len(caught.value.problems) == 1
 
 
+@pytest.mark.full
 def test_a_long_chain_is_refused_and_does_not_overflow() -> None:
     links = "".join(f"  p{k}: {{from: p{k + 1}}}\n" for k in range(1500))
     with pytest.raises(InputError, match="more than 100 points stand one relative to the next"):

@@ -193,7 +193,7 @@ def of_move(target: str) -> Target:
 
 
 @pytest.mark.parametrize("origin", ["here", "j", "h", "k"])
-@pytest.mark.parametrize("along", [*AXES, "tool", ""])
+@pytest.mark.parametrize("along", few([*AXES, "tool", ""], 3))
 def test_what_only_the_plan_knows_is_kept_as_a_displacement(origin: str, along: str) -> None:
     frame = f", frame: {along}" if along else ""
     relative = of_move(f"{{from: {origin}, {OFFSET_TEXT}{frame}, configuration: {{elbow: down}}}}").relative

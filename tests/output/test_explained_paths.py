@@ -135,6 +135,7 @@ def test_a_corner_that_is_cut_is_left_by_less_than_where_it_begins(kind: str) ->
         assert path.length < 0.18
 
 
+@pytest.mark.full
 def test_a_weave_is_told_by_the_parts_of_its_seam() -> None:
     """Of 100 mm and 80 mm between stops with cycles of about 20 mm: as many as fit, whole or half ones."""
     weave = {"amplitude": 0.003, "length": 0.021}

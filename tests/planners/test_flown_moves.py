@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.planners.flying_by.flown_moves import zone_events
@@ -75,7 +76,7 @@ FLOWN = [
 ]
 
 
-@pytest.mark.parametrize("name", ["position", "joints", "orientation"])
+@pytest.mark.parametrize("name", few(["position", "joints", "orientation"], 2))
 def test_what_is_said_of_a_zone_is_what_rows_in_it_show(name: str) -> None:
     made = plan(name)
     assert made.flyby is not None
@@ -153,6 +154,7 @@ def test_the_limit_of_which_a_zone_uses_most_counts_by_its_direction(sign: int) 
         assert used[zone.binds] == pytest.approx(max(used.values()), rel=1e-4)
 
 
+@pytest.mark.full
 def test_pictures_of_a_zone_are_about_its_corner() -> None:
     made = plan()
     assert made.flyby is not None

@@ -83,7 +83,7 @@ def states_at(motion: Trajectory, times: list[float]) -> np.ndarray:
     return np.array([[row[0] for row in motion.at_time(time)] for time in times])
 
 
-@pytest.mark.parametrize("parts", [(0.003, 0.7), (0.2, 0.999), (0.001, 0.9995), (0.3, 0.6)])
+@pytest.mark.parametrize("parts", few([(0.003, 0.7), (0.2, 0.999), (0.001, 0.9995), (0.3, 0.6)], 2))
 @pytest.mark.parametrize("tempo", few([0.8, 1.0], 1))
 def test_between_states_of_a_motion_that_keeps_its_limits_one_as_fast_is_found(parts, tempo):
     """Also between those next to rest: there a law of sd^2 by s has a pole in its jerk."""

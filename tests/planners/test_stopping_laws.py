@@ -84,6 +84,7 @@ def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace
             assert np.abs(part.curve.evaluate(times, order)).max() <= limit * (1 + 1e-8)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("findings", "times"), [([SimpleNamespace(kind="zone", factor=None)], 1), ([], 2)])
 def test_laws_beside_a_zone_that_has_to_change_are_not_made_better(findings, times, monkeypatch):
     made = []
@@ -113,6 +114,7 @@ def test_a_state_comes_from_that_of_a_faster_law_to_that_of_the_one_that_stops()
     assert squares[1] - squares[2] == pytest.approx(0.3 * (1.2**2 - passed**2), rel=1e-6)
 
 
+@pytest.mark.full
 def test_a_law_between_the_same_states_is_looked_for_once(monkeypatch):
     made = []
     monkeypatch.setattr(looked_for, "along_path", lambda *given: made.append(0) or along_path(*given))
@@ -219,6 +221,7 @@ def refusing(index, side, largest):
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("index", "side"), [(0, 1), (1, 0)])
 def test_where_a_law_fails_beside_a_border_the_state_there_is_calmed(index, side, monkeypatch):
     """Nothing else is slower for it, but the zone beside it."""
@@ -273,6 +276,7 @@ def test_a_law_fails_at_the_node_that_is_nearer(part, node):
     assert search._failing(1, None if part is None else first + part * (last - first)) == node
 
 
+@pytest.mark.full
 def test_the_state_at_the_start_of_a_chain_is_not_calmed(monkeypatch):
     def found(course, number, stretch, states, tempo):
         if number == 0 and states[0, 1] > 0.95 * started:
@@ -291,6 +295,7 @@ def test_the_state_at_the_start_of_a_chain_is_not_calmed(monkeypatch):
         motion_search.MotionSearch(CourseLaws(), by_order=True).fastest(chain)
 
 
+@pytest.mark.full
 def test_states_on_both_sides_of_a_zone_are_calmed_together():
     chain, _ = chain_with("lines")
     search = motion_search.MotionSearch(CourseLaws(), by_order=True)
@@ -303,6 +308,7 @@ def test_states_on_both_sides_of_a_zone_are_calmed_together():
     assert not np.allclose(one[1], states[1], rtol=1e-5)
 
 
+@pytest.mark.full
 def test_a_calmer_state_that_costs_too_much_is_left(monkeypatch):
     chain, _ = chain_with("lines")
     search = motion_search.MotionSearch(CourseLaws(), by_order=True)
@@ -341,6 +347,7 @@ def test_a_state_with_an_acceleration_where_only_speeds_count_is_rounded_to_one_
     assert change == 0.0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("doubtful", "asked"), [((), [0, 1]), ({1}, [1])])
 def test_courses_that_had_no_law_are_tried_before_the_others(doubtful, asked, monkeypatch):
     def found(course, number, stretch, states, tempo):
@@ -357,6 +364,7 @@ def test_courses_that_had_no_law_are_tried_before_the_others(doubtful, asked, mo
     assert (list(refused.value.failing), looked) == ([1], asked)
 
 
+@pytest.mark.full
 def test_a_search_knows_which_course_had_no_law(monkeypatch):
     """While it fails no other is looked for: laws of long paths cost most of the time of a search."""
 
@@ -393,6 +401,7 @@ def test_what_joints_do_not_use_in_a_zone_is_lowered_at_once():
         assert uses == pytest.approx(np.array([[share, share / 2], [0, 0], [0, 0]]))
 
 
+@pytest.mark.full
 def test_a_second_search_lowers_paces_where_that_looks_faster():
     """Of the acceleration of the tool in a zone: it ends where one does that knows nothing of the first."""
     free, _ = chain_with("joints")
@@ -418,12 +427,15 @@ def test_a_second_search_lowers_paces_where_that_looks_faster():
 
 @pytest.mark.parametrize(
     ("error", "far"),
-    [
-        (UnsettledSpeedError(0.1, 1.3), False),
-        (UnsettledSpeedError(0.1, 1.9), True),
-        (UnreachableSpeedError("end", 0.1, 1.01, 1.0), False),
-        (UnreachableSpeedError("end", 0.1, 1.2, 1.0), True),
-    ],
+    few(
+        [
+            (UnsettledSpeedError(0.1, 1.3), False),
+            (UnsettledSpeedError(0.1, 1.9), True),
+            (UnreachableSpeedError("end", 0.1, 1.01, 1.0), False),
+            (UnreachableSpeedError("end", 0.1, 1.2, 1.0), True),
+        ],
+        2,
+    ),
 )
 def test_where_a_law_is_far_from_its_limits_no_calmer_state_is_tried(error, far, monkeypatch):
     """States are calmed by 3 % of their speeds and 27 % of their accelerations at most."""

@@ -213,6 +213,7 @@ def _tool_is_where_it_may_be(
             assert np.linalg.norm(along - share[:, None] * whole, axis=1).max() <= 1e-6 + 1e-8
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", few([13, 0, 1, 6], 1))
 def test_a_random_cell_keeps_all_that_its_rows_say(
     seed: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]

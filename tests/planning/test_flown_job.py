@@ -164,6 +164,7 @@ def test_a_zone_of_next_to_nothing_is_stopped_in_and_that_is_said() -> None:
     assert [(remark.kind, remark.move) for remark in made.remarks] == [("zone_stops", 1)]
 
 
+@pytest.mark.full
 def test_a_job_that_is_aligned_flies_by_in_whole_periods() -> None:
     free, aligned = planned(0.02), planned(0.02, align=True)
     assert free.flyby is not None
@@ -174,6 +175,7 @@ def test_a_job_that_is_aligned_flies_by_in_whole_periods() -> None:
     assert aligned.flyby.searched == pytest.approx(free.flyby.searched, rel=1e-9)
 
 
+@pytest.mark.full
 def test_a_start_in_motion_is_kept_where_a_chain_would_have_to_be_stretched() -> None:
     """Another duration of the same motion begins at another speed: then the arm stops, in whole periods, too."""
     rates = [0.6, 0.05]  # along the first line
@@ -193,6 +195,7 @@ def test_a_start_in_motion_is_kept_where_a_chain_would_have_to_be_stretched() ->
     assert "begins in motion" in event.message
 
 
+@pytest.mark.full
 def test_a_path_that_bends_where_the_arm_moves_already_is_left_to_the_move_that_stops() -> None:
     """The joints come without the acceleration that its curvature takes at that speed: a step of it is none."""
     path = {"planner": "time_optimal", "through": [{"joints": [0.6, 1.5]}], "to": {"joints": [0.9, 1.25]}}

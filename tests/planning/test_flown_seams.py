@@ -136,6 +136,7 @@ def test_a_wanted_speed_is_held_on_so_much_of_a_path_between_zones_and_explained
     assert text.count("line from") == 2
 
 
+@pytest.mark.full
 def test_rows_of_another_motion_are_compared_with_the_path_outside_of_zones(
     job: Path, tmp_path: Path, capfd, monkeypatch
 ):

@@ -59,6 +59,7 @@ WAYS = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", few(list(WAYS), 1))
 def test_waypoints_are_flown_by_at_their_ends_and_pass_their_points(name):
     *inner, last = WAYS[name]

@@ -81,6 +81,7 @@ def pick(zone: float) -> Plan:
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("zone", "most", "found"), few([(10, 4.486, 4.4842), (20, 4.360, 4.3583), (50, 4.011, 4.0091)], 1)
 )
@@ -317,6 +318,7 @@ def test_a_joint_of_a_zone_that_may_not_leave_the_corner_leaves_the_others_their
     assert one.used <= 0.1
 
 
+@pytest.mark.full
 def test_a_zone_may_be_an_angle_or_joints_and_all_of_them_hold():
     joints = flown(zone={"joints": 0.05})
     assert joints.flyby.zones[0].of == "joints"

@@ -55,6 +55,7 @@ def test_a_singular_corner_is_flown_by():
     assert plan.flyby.duration < 0.8 * plan.flyby.stopping
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("size", few([0.3, 0.2, 0.1], 1))
 def test_a_zone_that_is_left_at_half_its_size_is_flown_by_at_less(size):
     """A joint that hardly moves has no room, however slow: the motion needs borders nearer to the corner."""
@@ -79,6 +80,7 @@ def test_a_corner_behind_which_another_branch_is_asked_for_is_refused_as_without
             planned(to(0.8, -0.5), line, **({} if zone is None else {"zone": zone}))
 
 
+@pytest.mark.full
 def test_where_joints_may_step_a_limit_of_the_tools_jerk_stops_a_chain_until_they_may_not():
     """No size and no pace of its zone helps, so none is tried; what is advised does."""
     moves = to(0.9, 1.2), to(0.9, 0.5)
@@ -181,6 +183,7 @@ def test_a_move_that_stops_at_corners_of_its_own_is_flown_by_at_its_ends(limits)
     np.testing.assert_allclose(state, [[0.8, 1.5], [0, 0]], atol=1e-7)
 
 
+@pytest.mark.full
 def test_of_points_in_zones_a_flown_move_promises_nothing():
     """The first one and the last one are nearer to the corners than their zones reach; those between are passed."""
     inner = np.array([[0.605, 1.302], [0.8, 1.5], [0.9, 1.45], [0.998, 1.303]])
@@ -193,6 +196,7 @@ def test_of_points_in_zones_a_flown_move_promises_nothing():
     np.testing.assert_allclose(plan.trajectory.curve.evaluate(times), inner[1:3], atol=1e-9)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "stop", few([{"corner": "stop"}, {"radius": 0.02}], 1), ids=few(["corner", "radius"], 1)
 )
@@ -236,6 +240,7 @@ def program(count: int) -> list[dict[str, Any]]:
     return [to(*(np.array([0.9, 1.25]) + draws.uniform(-0.5, 0.5, 2))) for _ in range(count)]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("count", [5 if QUICK else 51])
 def test_many_zones_are_flown_by(count):
     plan = planned(*program(count))

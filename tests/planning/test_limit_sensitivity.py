@@ -324,6 +324,7 @@ def test_a_search_from_the_motion_that_is_known_finds_what_one_from_nothing_find
         assert plan.trajectory.duration - seconds == pytest.approx(anew.trajectory.duration, rel=1e-3)
 
 
+@pytest.mark.full
 def test_a_higher_limit_costs_no_time() -> None:
     """What keeps a limit keeps a higher one: a search that finds a slower motion with it saves nothing."""
     through = [{"joints": q} for q in np.random.default_rng(1).uniform(-1, 1, (5, 2)).tolist()]

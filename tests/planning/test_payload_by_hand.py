@@ -42,7 +42,7 @@ def torques(pose: Sequence[float], com: Sequence[float]) -> tuple[np.ndarray, np
 
 
 @pytest.mark.parametrize("com", few([(0.06, 0.02), (0.0, 0.3), (-0.2, 0.0)], 2))
-@pytest.mark.parametrize("pose", [(0, 20), (180, -20), (60, 80), (-120, -50)])
+@pytest.mark.parametrize("pose", few([(0, 20), (180, -20), (60, 80), (-120, -50)], 2))
 def test_of_an_arm_that_stands(pose: Sequence[float], com: Sequence[float]) -> None:
     """Limits differ by direction, and the joint that binds by the pose."""
     low, high = np.array([-70.0, -20.0]), np.array([90.0, 30.0])
@@ -85,7 +85,8 @@ def _counted(job: str, at: int | None = None) -> tuple[PayloadCapacity, int]:
 
 
 @pytest.mark.parametrize(
-    ("job", "most"), [(CARRYING, 6), (CARRYING.replace("b: [-40, 30]", "b: [-15, 30]"), 6), (FREE, 12)]
+    ("job", "most"),
+    few([(CARRYING, 6), (CARRYING.replace("b: [-40, 30]", "b: [-15, 30]"), 6), (FREE, 12)], 2),
 )
 def test_few_masses_are_tried_and_the_next_larger_one_fails(job: str, most: int) -> None:
     """Where the motion is given its rows say which mass; else each has its own, and a line leads there."""
@@ -113,6 +114,7 @@ def test_of_several_payloads_the_one_that_is_meant() -> None:
     assert one == 0
 
 
+@pytest.mark.full
 def test_only_limits_where_something_is_carried_count() -> None:
     """Those of a move, in a job that has none."""
     job = CARRYING.replace("MASS", "1").replace("limits: {effort: {a: 90, b: [-40, 30]}}\n", "")

@@ -94,6 +94,7 @@ OTHER_TOOL = EMPTY.replace(
 ).replace("moves:\n", "moves:\n  - {attach: {mass: MASS}}\n  - {tool: bare}\n")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("at", [None, 3])
 def test_what_is_attached_keeps_its_place_on_the_flange_behind_a_change_of_the_tool(at: int | None) -> None:
     """At 300 mm from the flange, and not at the tcp of the second tool."""

@@ -244,6 +244,7 @@ def refused(*moves: dict[str, Any], **fields: Any) -> str:
     return "".join(f"{problem.message}\n{problem.hint or ''}\n" for problem in caught.value.problems)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("begin", "end", "rail"),
     few([((2.5, 0.2, 0.9), 4.5, 0.5), ((2.5, 0.2, 0.9), 4.5, 0.0), ((1.8, 0.0, 1.6), -1.5, 1.1)], 1),
@@ -288,6 +289,7 @@ def test_a_singularity_on_the_way_of_a_pinned_rail_is_named() -> None:
     assert float(found[2]) < 1e-5
 
 
+@pytest.mark.full
 def test_what_cannot_be_pinned_is_refused() -> None:
     line = {"planner": "line", "law": LAW}
     two = {"joints": {"rail": 1.1, "joint_1": 0.1}}

@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from independent_judge import broken_limits, extremes, step_breakers
 from random_jobs import MOST_JOINTS, RATES, TAGS, loaded, random_job
+from tiers import few
 
 from trajcli.errors import InputError, PlanningError
 from trajcli.peers.lower_bound import LowerBound, fastest_duration
@@ -17,7 +18,7 @@ from trajcli.peers.move_reference import reference_of
 from trajcli.planning.plan import Plan, plan_job
 
 SEEDS = st.integers(0, 2**32 - 1)
-few = settings(max_examples=40, deadline=None)
+drawn = settings(max_examples=40, deadline=None)
 
 
 def plan_of(job: dict[str, Any]) -> Plan | None:
@@ -71,7 +72,7 @@ def test_the_verdict_is_that_of_an_independent_judge(
     assert plan.verdict.passed == (not found)
 
 
-@few
+@drawn
 @given(
     seed=SEEDS,
     tag=st.sampled_from(["cubic", "quintic", "septic", "cycloidal", "trapezoid"]),
@@ -144,7 +145,7 @@ def test_no_planner_beats_the_bound(seed: int, tag: str, joints: int) -> None:
     assert told.ratio is None or told.ratio >= 1 - 1e-9
 
 
-@few
+@drawn
 @given(seed=SEEDS, joints=st.integers(1, 6), overshoot=st.booleans())
 def test_the_fastest_trapezoid_of_each_joint_is_the_bound(seed: int, joints: int, overshoot: bool) -> None:
     """Without a jerk limit the time-optimal motion is a trapezoid, whatever its boundary velocities."""
@@ -222,10 +223,10 @@ def test_a_move_that_starts_at_rest_refuses_another_start(tag: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "limit", [{"velocity": 1}, {"acceleration": 1}, {"jerk": 1}, {"velocity": 1, "jerk": 5}]
+    "limit", few([{"velocity": 1}, {"acceleration": 1}, {"jerk": 1}, {"velocity": 1, "jerk": 5}], 2)
 )
 @pytest.mark.parametrize("tag", ["cubic", "quintic", "septic", "cycloidal"])
-@pytest.mark.parametrize("displacement", [1e-18, 3e-17, 1e-15, 1e-13, 1e-11, 1e-9])
+@pytest.mark.parametrize("displacement", few([1e-18, 3e-17, 1e-15, 1e-13, 1e-11, 1e-9], 4))
 def test_a_tiny_move_late_in_a_job_passes(tag: str, limit: dict[str, float], displacement: float) -> None:
     job = job_of(
         {"planner": "hold", "duration": 9.7},

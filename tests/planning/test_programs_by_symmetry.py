@@ -239,7 +239,7 @@ def outcome_of(seed: int) -> Plan | str:
     return outcome(random_program(seed))
 
 
-@pytest.mark.parametrize("law", [moved, faster, larger, mirrored, in_degrees])
+@pytest.mark.parametrize("law", few([moved, faster, larger, mirrored, in_degrees], 2))
 @pytest.mark.parametrize("seed", few(range(12), 1))
 def test_a_program_in_other_words_is_the_same_motion(seed: int, law: Callable[[Fields], float]) -> None:
     before, other = outcome_of(seed), random_program(seed)

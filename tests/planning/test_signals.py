@@ -82,6 +82,7 @@ def test_a_signal_along_a_path_is_set_where_the_tool_has_gone_so_far() -> None:
     assert np.linalg.norm(end - late) == pytest.approx(0.01, abs=2e-6)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("jerk", [None, pytest.param(8000, marks=pytest.mark.full)])
 def test_about_a_corner_the_tool_enters_is_nearest_and_leaves(jerk: float | None) -> None:
     some = [at("leave"), at("nearest"), at("enter"), at({"path": 30}), at({"path": -5})]
@@ -141,6 +142,7 @@ def test_lengths_count_from_both_ends_and_times_from_the_arrival() -> None:
             planned(line(0, 0, 80, at=at("leave", before)))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("length", few([210.0, 100.0, 130.0, 290.0], 1))
 def test_the_whole_length_of_a_path_is_within_it_however_it_is_rounded(length: float) -> None:
     """Without a zone, and where there is one about another corner."""
@@ -175,6 +177,7 @@ def test_behind_a_zone_lengths_still_count_from_the_start_of_the_programmed_path
     assert inside == pytest.approx(fine[off.argmin()], abs=fine[1] - fine[0])
 
 
+@pytest.mark.full
 def test_a_row_at_the_very_time_has_the_new_value_and_before_the_first_it_is_0() -> None:
     plan = planned(line(0, 0, 80, at=at(before=0.1, value=3)), {"signal": "s", "value": 2}, line(80, 0, 0))
     first, second = times_of(plan)
@@ -183,6 +186,7 @@ def test_a_row_at_the_very_time_has_the_new_value_and_before_the_first_it_is_0()
     assert rows[:, 1].tolist() == [0, 0, 3, 3, 2, 2]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("distance", few([30.0, 40.0, 55.0, 70.0, 90.0, 120.0], 2))
 def test_the_row_of_a_knot_at_the_time_of_a_signal_has_its_value(distance: float) -> None:
     """A knot stands at the nearest nanosecond, which may be before the break at which the signal is set."""
@@ -215,6 +219,7 @@ def test_report_explain_and_the_resolved_job_say_them() -> None:
     assert resolved.trajectory.signals == plan.trajectory.signals
 
 
+@pytest.mark.full
 def test_a_log_has_a_topic_for_each_signal(tmp_path: Path) -> None:
     from mcap.reader import make_reader
     from streams.mcap.conftest import write_log

@@ -69,6 +69,7 @@ def test_the_range_is_left_ever_further_on_either_side(sign: int) -> None:
     assert plan_job(loaded(job)).verdict.passed
 
 
+@pytest.mark.full
 def test_a_move_between_moving_states_is_slowed_to_a_limit_of_the_tool() -> None:
     job = {
         "version": 1,

@@ -112,6 +112,7 @@ def test_names_cannot_leave_the_data() -> None:
     assert elements.of("title")[0][1] == name
 
 
+@pytest.mark.full
 def test_a_page_is_the_same_each_time() -> None:
     assert page(job(3)) == page(job(3))
     assert page(job(3), compress=True) == page(job(3), compress=True)

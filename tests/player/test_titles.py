@@ -23,7 +23,7 @@ FEWER_LIMITS = {"two_tools": ["limits.effort=null", "limits.jerk=null"]}
 ALL = sorted(path.stem for path in EXAMPLES.glob("*.yaml"))
 
 
-@pytest.mark.parametrize("name", dict.fromkeys([*QUICK, *few(ALL, 1)]))
+@pytest.mark.parametrize("name", few(dict.fromkeys([*QUICK, *few(ALL, 1)]), 2))
 def test_moves_have_one_count_and_one_title(name: str) -> None:
     loaded = load_job(EXAMPLES / f"{name}.yaml", FEWER_LIMITS.get(name, []) if QUICK_TIER else [])
     plan = planned_once(loaded)

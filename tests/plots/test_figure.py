@@ -96,6 +96,7 @@ def test_texts_of_a_hundred_moves_and_of_wide_numbers_do_not_overlap() -> None:
     assert overlaps(picture_of(plan_job(job_from_text(text)))) == []
 
 
+@pytest.mark.full
 def test_texts_of_many_files_and_a_long_title_do_not_overlap(example: Example) -> None:
     names = ("t", "q1_deg", "q2_deg")
     rows = np.array([[0.0, 0.0, 1.0], [1.0, 5.0, 7.0]])
@@ -383,7 +384,7 @@ def reference_picture(name: str, example: Example) -> Picture:
 
 @pytest.mark.parametrize(
     "name",
-    few(["spline", "sync", "ur5e_pick", "twelve", "dispense", "time_optimal", "findings", "overlay"], 3),
+    few(["spline", "sync", "ur5e_pick", "twelve", "dispense", "time_optimal", "findings", "overlay"], 2),
 )
 def test_pictures_look_as_they_did(name: str, example: Example) -> None:
     """The references are looked at before they are committed; TRAJCLI_NEW_REFERENCES=1 writes them anew."""
@@ -408,6 +409,7 @@ def blocks_of(image: np.ndarray, size: int = 8) -> np.ndarray:
     return cut.mean(axis=(1, 3))
 
 
+@pytest.mark.full
 def test_the_comparison_of_pictures_sees_a_line_that_is_missing(
     two: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:

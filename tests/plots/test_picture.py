@@ -129,6 +129,7 @@ def test_the_path_of_the_tool_goes_through_the_poses_of_the_job(example: Example
     assert np.linalg.norm(views.waypoints - [350, -80, 50], axis=1).min() < 1e-3
 
 
+@pytest.mark.full
 def test_the_phase_plane_of_a_move_along_a_path_has_its_speed_as_limit(example: Example) -> None:
     (panel,) = panels(picture_of(example("dispense"), quantities=["phase"])).values()
     assert (panel.x_label, panel.y_label) == ("s [m]", "s\u0307 [m/s]")
@@ -216,6 +217,7 @@ def test_points_of_a_path_have_their_names(example: Example) -> None:
 NAMED = {"q\u0307": "qd", "q\u0308": "qdd", "q\u20db": "qddd", "\u03c4": "tau", "s\u0307": "sd"}
 
 
+@pytest.mark.full
 def test_what_suits_a_job(example: Example) -> None:
     def kinds(name: str) -> set[str]:
         picture = picture_of(example(name))

@@ -233,6 +233,7 @@ def test_a_joint_that_is_free_in_a_row_stays_near_to_the_row_before() -> None:
     assert np.abs(found[18] - q[17])[[3, 5]].max() < 0.06
 
 
+@pytest.mark.full
 def test_an_arm_without_a_closed_form_goes_on_inside_its_ranges() -> None:
     """Three turns in the plane: a step is the shortest, of Newton's method, where that stays inside and near."""
     free = unlimited(3)

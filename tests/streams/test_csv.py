@@ -181,6 +181,7 @@ def test_a_closed_pipe_is_said_as_such():
         write_csv(blocks_of(table()), COLUMNS, out)
 
 
+@pytest.mark.full
 def test_memory_is_the_same_for_many_rows(tmp_path):
     def rows(count):
         for low in range(0, count, 4096):

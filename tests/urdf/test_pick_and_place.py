@@ -43,6 +43,7 @@ RAIL = """\
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("kind", "above"),
     few(

@@ -90,7 +90,7 @@ def test_splines_whose_best_durations_are_known(number):
 
 
 @pytest.mark.parametrize("count", few([2, 3, 5, 12], 2))
-@pytest.mark.parametrize("factor", [1, 0.02, 0.005])
+@pytest.mark.parametrize("factor", few([1, 0.02, 0.005], 2))
 def test_reversed_scaled_and_mirrored_paths_take_as_long(count, factor):
     """The limits are alike in both directions, so time may run backwards, and s may be measured otherwise."""
     points = np.cumsum(np.random.default_rng(count).uniform(-0.7, 0.7, (count, 7)), axis=0)
@@ -107,6 +107,7 @@ def test_reversed_scaled_and_mirrored_paths_take_as_long(count, factor):
         assert judged(other, *bounds).law.duration == pytest.approx(duration, rel=2e-3)
 
 
+@pytest.mark.full
 def test_twice_the_time_for_limits_of_slower_joints():
     """Limits divided by 2, 4 and 8 are those of the same motion at half the speed."""
     path = spline(np.linspace(0, 1, 6), np.random.default_rng(1).uniform(-1, 1, (6, 7)))
@@ -184,6 +185,7 @@ def test_a_loose_limit_of_jerk_costs_next_to_nothing():
     assert motion.lower_bound <= motion.law.duration <= 1.003 * fastest.law.duration
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", few([0, 1], 1))
 def test_below_the_stations_of_copp(seed):
     """COPP keeps the limits at 1001 stations only; figures of its release 0.2.3."""

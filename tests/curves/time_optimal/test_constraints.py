@@ -82,6 +82,7 @@ def share_of(wave: Wave, law: PiecewisePolynomial) -> float:
     return float((sd / wave.limit(s)).max())
 
 
+@pytest.mark.full
 def test_a_limit_that_is_exceeded_between_grid_points_is_tightened():
     path, limits = polyline([[0.0], [1.0]]), (symmetric(9.0), symmetric(50.0))
     blind = time_optimal(path, *limits, further=[BlindWave()])

@@ -143,6 +143,7 @@ def test_two_lists_go_together() -> None:
     )
 
 
+@pytest.mark.full
 def test_a_place_is_so_many_times_the_step() -> None:
     text = """\
 points:

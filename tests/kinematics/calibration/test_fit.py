@@ -153,6 +153,7 @@ def told(robot, parameters, q, part):
     return [parameter for parameter in parameters if parameter not in lost]
 
 
+@pytest.mark.full
 def test_deviations_hold_whatever_the_scale_is():
     robot, parameters = arm("puma"), parse_parameters(arm("puma"), "j2,j3,j4.a")
     for length in (0.02, 1.0, 50.0):

@@ -38,7 +38,7 @@ def around(case_, held, middle, step):
     return s, np.array(rows[-7:])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", few(NAMES, 4))
 def test_values_and_derivatives_by_place(name):
     made = CASES[name]
     arm, length = followed(made), made.path.length

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from inverse_arms import arm, gap
+from tiers import few
 
 from trajcli.errors import InputError
 from trajcli.kinematics.forward import forward
@@ -25,9 +26,9 @@ def lying(robot: Robot) -> Robot:
     return replace(robot, base=ON_ITS_SIDE)
 
 
-@pytest.mark.parametrize(("axis", "unturned"), [("z", "z"), ("x", None), ("y", None)])
+@pytest.mark.parametrize(("axis", "unturned"), few([("z", "z"), ("x", None), ("y", None)], 2))
 @pytest.mark.parametrize(
-    "given", [{"direction": [1.0, 0.0, 0.0]}, {"direction": [0.0, 0.0, -1.0]}, {"pitch": 0.3}]
+    "given", few([{"direction": [1.0, 0.0, 0.0]}, {"direction": [0.0, 0.0, -1.0]}, {"pitch": 0.3}], 2)
 )
 def test_an_axis_that_no_joint_turns_is_named(given: dict, axis: str, unturned: str | None) -> None:
     """That of a SCARA's tool along its own joints, whether or not it can be met."""

@@ -68,7 +68,8 @@ def test_a_path_through_a_hole_of_the_workspace_is_missed_by_its_middle() -> Non
     assert float(missed) == pytest.approx(0.1, rel=1e-6)
 
 
-@pytest.mark.parametrize("off", [1e-3, 5e-5, 1e-6, 1e-7])
+@pytest.mark.full
+@pytest.mark.parametrize("off", few([1e-3, 5e-5, 1e-6, 1e-7], 2))
 def test_a_hole_that_is_narrower_than_samples_of_the_path_is_missed_by_its_middle(off: float) -> None:
     start = {"xyz": [0.5, 0.2 - off, 0], "configuration": UP}
     place, _, missed, _ = said(problem_of(HOLLOW, start, straight(-0.5, 0.2 - off)), REACH)
@@ -95,6 +96,7 @@ def test_a_tool_that_turns_in_its_place_has_angles_for_places(unit: str, shape: 
     assert float(missed) == pytest.approx(far, rel=1e-5)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("stick", "off", "missed"),
     few([(0.1, 0.4, "0.4 m"), (0.1, 0.0, "0.5 rad"), (3.0, 0.7, "0.5 rad"), (3.0, 0.7, "0.7 m")], 2),
@@ -216,6 +218,7 @@ def test_a_larger_tolerance_is_proposed_where_it_helps(limited: bool) -> None:
     assert ("`tolerance`" in (problem.hint or "")) != limited
 
 
+@pytest.mark.full
 def test_what_a_target_leaves_free_is_held_up_to_where_the_arm_would_turn_round() -> None:
     """There the directions that the pose fixes and the one that is held depend on each other, the first alone do not."""
     q = np.array([-0.287, 0.724, 0.64, -1.5, -0.503, -0.224, -0.341])

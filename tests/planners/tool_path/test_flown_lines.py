@@ -56,7 +56,7 @@ def rates(plan: Plan, number: int) -> tuple[np.ndarray, np.ndarray]:
     return np.gradient(s, times), np.diff(s, 2) / (times[1] - times[0]) ** 2
 
 
-@pytest.mark.parametrize(("number", "jerk"), few([(0, None), (1, None), (1, 600), (0, 600)], 2))
+@pytest.mark.parametrize(("number", "jerk"), few([(0, None), (0, 600), (1, None), (1, 600)], 2))
 def test_the_deceleration_that_a_law_names_is_kept_beside_a_zone(number: int, jerk: float | None) -> None:
     """Slowing down alone is slower than the other acceleration, and no bound is above the motion."""
     laws = [{"speed": 0.5, "acceleration": 2.0}, {"speed": 0.5, "acceleration": 2.0}]
@@ -95,6 +95,7 @@ def speeds_in_zone(plan: Plan) -> np.ndarray:
     return np.linalg.norm(np.diff(places, axis=0), axis=1) / (times[1] - times[0])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("speeds", few([(0.1, 0.15), (0.15, 0.1)], 1))
 def test_in_a_zone_the_higher_of_the_speeds_that_two_laws_name_is_kept(speeds: tuple[float, float]) -> None:
     """Joints alone would go far faster there; a law that names none leaves it to them."""
@@ -110,6 +111,7 @@ def test_in_a_zone_the_higher_of_the_speeds_that_two_laws_name_is_kept(speeds: t
     assert plan.trajectory.duration < plan.flyby.stopping * 0.99
 
 
+@pytest.mark.full
 def test_a_zone_at_a_low_speed_of_the_tool_is_flown_by_nearly_at_that_speed() -> None:
     """The way is no shorter than what lies outside of the ball and a chord of it, at 100 mm/s."""
     law = {"shape": "time_optimal", "speed": 100}

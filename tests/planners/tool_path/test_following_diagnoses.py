@@ -60,6 +60,7 @@ def test_the_joint_that_goes_fastest_into_a_singularity_is_named(
     assert (joint, shown) == (name, unit)
 
 
+@pytest.mark.full
 def test_a_place_beyond_the_reach_is_missed_by_what_lies_beyond() -> None:
     problem = refusal(2.5)
     said = re.search(r"beyond s = (\S+) m: it stays up to (\S+) m away", problem.message)

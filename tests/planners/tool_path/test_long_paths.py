@@ -51,6 +51,7 @@ def test_pieces_are_allowed_by_the_breaks_of_a_path():
     assert most_pieces(np.arange(3001.0)) > 100 * 3000
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("side", few(["left", "right"], 1))
 def test_overlapping_segments_add_up_as_the_textbook_says(side):
     """Siciliano, eq. 4.43: p0 plus all that the segments have gone, those done and those not begun as well."""

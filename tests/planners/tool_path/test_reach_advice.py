@@ -20,6 +20,7 @@ def outwards(by):
     return pose[:3, 3] + by * np.array([np.cos(0.2), np.sin(0.2), 0.0]), pose[:3, :3]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("by", "helps"), few([(0.1, True), (0.15, False), (0.5, False)], 1))
 def test_freeing_the_orientation_is_proposed_where_it_helps(by, helps):
     xyz, rotation = outwards(by)
@@ -36,6 +37,7 @@ def test_freeing_the_orientation_is_proposed_where_it_helps(by, helps):
         refusal("elbow4r", start, line(to, law=LAW), limits=FREE)
 
 
+@pytest.mark.full
 def test_a_target_by_joints_says_how_the_way_to_its_place_is_free():
     """An arm of four joints cannot turn the tool evenly on a line; it can go there with the turn that it has."""
     start, to = {"joints": JOINTS}, np.array([0.5, 0.4, -1.1, 0.2])

@@ -103,6 +103,7 @@ def test_a_radius_of_zero_stops_at_that_corner_alone():
     assert found[2] < 1e-6
 
 
+@pytest.mark.full
 def test_half_a_corner_belongs_to_each_of_its_segments():
     """The law steps where the blend of 10 mm is nearest to its corner."""
     made = bent()

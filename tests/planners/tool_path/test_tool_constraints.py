@@ -103,6 +103,7 @@ def test_a_turn_in_place_has_no_jerk_that_could_be_limited():
     assert "limits" not in error.problems[0].hint
 
 
+@pytest.mark.full
 def test_overlapping_segments_last_at_least_as_long_as_they_are_told():
     segments = [{"line": {"xyz": place}} for place in ([0.5, 0.1, 0.05], [0.5, 0.3, 0.05], [0.4, 0.3, 0.05])]
     move = {"planner": "path", "segments": segments, "corner": "overlap", "overlap": 0.1}

@@ -81,6 +81,7 @@ GANTRY = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("own", few([{}, {"jerk": 100}], 1))
 def test_a_circle_is_cruised_at_the_speed_whose_jerk_is_the_limit(own):
     """On a circle of radius r the acceleration v^2 / r turns with v / r: a jerk of v^3 / r^2."""
@@ -114,6 +115,7 @@ def test_the_jerk_of_the_tool_around_a_rounded_corner_is_used_and_kept():
     assert np.mean(sizes > 9.0) > 0.7
 
 
+@pytest.mark.full
 def test_a_corner_between_the_samples_of_a_long_path_bends_it():
     """It counted as straight: the limit of the jerk was kept by stretching the whole move three times."""
     steps = ([0.0, 0.0, 0.111], [0.0, 0.1, 0.111])

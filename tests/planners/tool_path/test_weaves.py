@@ -146,6 +146,7 @@ def test_other_lengths_are_fitted_and_told():
     assert np.abs(np.abs(places[:, 0] - 0.4) - np.abs(A * np.sin(2 * np.pi * s * 18 / 0.2))).max() < TOLERANCE
 
 
+@pytest.mark.full
 def test_a_frequency_is_the_speed_of_the_law_over_a_length():
     same, other = weaving(), weaving(weave={"length": None, "frequency": LAW["speed"] / CYCLE})
     assert other.trajectory.duration == same.trajectory.duration
@@ -212,6 +213,7 @@ def test_the_path_has_a_continuous_second_derivative(shape):
     assert np.abs(bend - values[2]).max() < 2e-3 * np.abs(values[2]).max()
 
 
+@pytest.mark.full
 def test_the_fastest_law_keeps_the_limits_of_the_tool():
     """Speeds and accelerations of the tool, not of the seam, by independent kinematics."""
     from tool_jobs import times_of, tool_rates
@@ -305,6 +307,7 @@ def test_a_weave_is_not_flown_by():
     assert not made.flyby.zones
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("shape", few(["sine", "triangle", "trapezoid"], 1))
 def test_an_explanation_says_shape_amplitude_and_cycles(shape):
     """In the units of the job; without a weave it says nothing of one."""

@@ -85,6 +85,7 @@ def test_a_joint_that_moves_needs_its_acceleration_in_both_directions(bounds: tu
     assert (np.diff(times) > 0).all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("points", [POINTS])
 def test_of_several_shares_of_the_segments_the_fastest_is_taken(
     points: object, monkeypatch: pytest.MonkeyPatch

@@ -22,6 +22,7 @@ def through_sine(count, rule="continuous_acceleration", amplitudes=(1.0,), passe
     return plan(points[0], move, passes=passes, limits=LIMITS)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("count", few([73, 400, 150, 1000], 1))
 def test_dense_points_are_passed_about_as_fast_as_the_joint_can(count):
     planned = through_sine(count)

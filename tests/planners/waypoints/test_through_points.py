@@ -315,6 +315,7 @@ def test_a_job_written_out_is_the_same_plan(tmp_path, planner, times):
     assert "csv" not in yaml.safe_load(text)["moves"][0]["through"]
 
 
+@pytest.mark.full
 def test_a_recording_that_follows_a_stretch(tmp_path):
     """A start in motion is planned anew for each duration; a later target and the recording go along."""
     text = "t,q1,q2\n0,0,0\n0.1,1,0\n0.3,1,1\n"

@@ -79,6 +79,7 @@ def test_jerk_ignored_is_as_without_limits_of_jerk():
     assert fastest(limits=without).trajectory.spans[0].continuity == 1
 
 
+@pytest.mark.full
 def test_phases_name_the_limits_of_jerk_and_the_bound_is_told():
     told = explanation(fastest()).model_dump()["moves"][0]
     assert {phase["name"].split()[0] for phase in told["phases"]} >= {"jerk", "velocity"}

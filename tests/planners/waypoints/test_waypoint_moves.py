@@ -171,6 +171,7 @@ def test_joints_that_do_not_move_stand_still_and_need_no_limits():
         trajcli.plan({**job, "robot": robot})
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("margin", few([0.02, 0.0], 1))
 def test_position_limits_are_kept(margin):
     q = np.array(POINTS)

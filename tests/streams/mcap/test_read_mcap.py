@@ -332,6 +332,7 @@ def test_every_end_is_an_error(tmp_path: Path) -> None:
         refused(path)
 
 
+@pytest.mark.full
 def test_a_changed_byte_is_found_or_harmless(tmp_path: Path) -> None:
     """Whatever byte is wrong: one clear error, or the same states as before."""
     values, messages = states(4)
