@@ -56,7 +56,7 @@ def test_load_dump_load_is_identity(plain: dict[str, Any]) -> None:
     assert dump_job(second) == text
 
 
-@pytest.mark.parametrize("example", few(EXAMPLES, 3), ids=lambda path: path.stem)
+@pytest.mark.parametrize("example", few(EXAMPLES, 4), ids=lambda path: path.stem)
 def test_the_resolved_example_gives_the_same_curve(example: Path) -> None:
     first = load_job(example)
     second = job_from_text(dump_job(first))

@@ -234,7 +234,6 @@ moves:
 """
 
 
-@pytest.mark.full
 def test_where_segments_have_speeds_of_their_own_the_limit_of_the_tool_steps_along_the_path() -> None:
     motion = PlannedMotion(planned(SEAM))
     plan = motion.plan

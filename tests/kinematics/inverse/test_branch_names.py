@@ -58,7 +58,7 @@ def names_of(robot, pose, configurations):
     return [str(solutions.names[int(np.where(solutions.valid, each, np.inf).argmin())]) for each in apart]
 
 
-@pytest.mark.parametrize("family", few([*few(list(FAMILIES)[:-2], 8), *list(FAMILIES)[-2:]], 3))
+@pytest.mark.parametrize("family", few([*few(list(FAMILIES)[:-2], 8), *list(FAMILIES)[-2:]], 6))
 def test_the_same_configuration_has_the_same_name_in_every_table(family):
     rng = np.random.default_rng(5)
     robot = arm(family)

@@ -70,7 +70,6 @@ def same_motion(one, other, atol=1e-7):
     assert np.abs(apart).max() < atol
 
 
-@pytest.mark.full
 def test_a_file_is_the_lines_to_its_poses(tmp_path):
     """The first row is where the arm stands; the doubled pose counts once."""
     made = planned(tmp_path, HEADER + rows(), {"csv": "poses.csv"})
