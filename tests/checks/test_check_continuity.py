@@ -322,7 +322,6 @@ def test_limits_must_be_as_many_as_moves() -> None:
         acceleration_steps(trajectory(between([0.0], [1.0])), [])
 
 
-@pytest.mark.full
 @settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_exactly_the_jumps_that_were_put_in_are_found(data) -> None:

@@ -12,7 +12,6 @@ from math import sqrt
 import numpy as np
 import pytest
 from recorded_rows import bare_robot
-from tiers import few
 
 from trajcli.findings import Finding
 from trajcli.judge.motion import Requirements, judge_motion
@@ -205,8 +204,8 @@ def test_speeds_by_position(piece, planted, certainty, side):
 
 
 @pytest.mark.parametrize("side", SIDES)
-@pytest.mark.parametrize(("planted", "certainty"), few(PLANTED, 2))
-@pytest.mark.parametrize("piece", few([0, 1, 3], 2))
+@pytest.mark.parametrize(("planted", "certainty"), PLANTED)
+@pytest.mark.parametrize("piece", [0, 1, 3])
 @pytest.mark.parametrize("turned", [0.0, np.pi], ids=["along", "against"])
 @pytest.mark.parametrize("limited", [0, 1])
 def test_forces_of_two_slides(limited, turned, piece, planted, certainty, side):

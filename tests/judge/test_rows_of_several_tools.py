@@ -133,7 +133,6 @@ def test_retiming_needs_to_know_the_tool_of_a_row(tmp_path: Path) -> None:
         retime(part, limits.requirements)
 
 
-@pytest.mark.full
 def test_velocities_beside_joints_are_judged_with_the_tool_of_their_move(tmp_path: Path) -> None:
     """Stretched rows are none of the plan: their velocities are judged by how the tool moves."""
     judged(tmp_path, "t, q, twist")

@@ -53,7 +53,7 @@ def of_tool(motion: RecordedMotion, robot: Robot, interpolate: str | None = None
 
 @SIDES
 @pytest.mark.parametrize("key", ["speed", "angular_speed"])
-@pytest.mark.parametrize("piece", few([0, 1, 2046, 2047, 2048, 2498], 2))
+@pytest.mark.parametrize("piece", [0, 1, 2046, 2047, 2048, 2498])
 def test_a_fast_piece_anywhere_in_a_long_file_is_found(piece: int, key: str, side: float) -> None:
     """More pieces than are looked at together; the slide beside moves in another one, slowly."""
     t = np.append(0.0, np.cumsum(0.02 + 0.01 * (np.arange(2499) % 7)))
@@ -638,7 +638,7 @@ def test_rounding_of_a_turn_counts_three_times_in_the_jerk_of_the_tool(side: flo
 
 
 @SIDES
-@pytest.mark.parametrize(("key", "power"), few([("speed", 1), ("acceleration", 2), ("jerk", 3)], 2))
+@pytest.mark.parametrize(("key", "power"), few([("speed", 1), ("acceleration", 2), ("jerk", 3)], 3))
 def test_rounding_of_a_slide_that_is_swung_counts_with_its_length(key: str, power: int, side: float) -> None:
     """A beam that turns 100 times a second or so, and a slide along it, which is a rounding further out."""
     off, rate, t = 1e-4, 100.0, np.arange(3.0)

@@ -80,7 +80,6 @@ def test_a_move_is_stretched_to_the_limit(key: str, move: dict[str, Any]) -> Non
     Report.model_validate_json(report_of(plan).model_dump_json())
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("key", few(THIRD, 1))
 def test_between_moving_states_the_search_sees_it(key: str) -> None:
     move = {"to": {"joints": [0.1 + TURN], "velocity": [0.3]}, "when_over_limit": "slow"}
@@ -116,7 +115,6 @@ def test_a_step_belongs_to_the_move_with_the_acceleration() -> None:
     assert {finding.move for finding in plan.verdict.findings} == {1}
 
 
-@pytest.mark.full
 def test_a_step_is_found_when_it_is() -> None:
     """A trapezoid that brakes harder than it speeds up, alone and after a rest of half a second."""
     job = link({"jerk": 500.0}, {"planner": "trapezoid"})
@@ -178,7 +176,7 @@ JOB_ON_PATH = {"version": 1, "robot": "ur5e", "limits": {"acceleration": 20}, "s
 
 
 @pytest.mark.parametrize("key", THIRD)
-@pytest.mark.parametrize("shape", few(["jerk_limited", "quintic", "time_optimal"], 2))
+@pytest.mark.parametrize("shape", ["jerk_limited", "quintic", "time_optimal"])
 @pytest.mark.parametrize("planner", few(["path", "line", "arc"], 1))
 def test_on_a_path_the_whole_vector_counts(planner: str, shape: str, key: str) -> None:
     """On a rounded corner the tool turns at speed: its jerk was 2.5 times that along the path."""

@@ -68,7 +68,6 @@ def test_what_a_period_proves_of_a_curve_of_degree_seven() -> None:
         assert (share <= 1 + 2e-7) == known
 
 
-@pytest.mark.full
 def test_a_path_of_the_tool_counts() -> None:
     """What a bound of cubics says of an arc, whose deviation and tool are judged where it says nothing."""
     with np.errstate(all="ignore"):

@@ -274,7 +274,6 @@ def test_a_law_along_a_line_has_the_limits_of_the_direction_of_each_joint(target
         np.testing.assert_array_equal(variable.bounds, [UNEQUAL[kind][joint] for kind in UNEQUAL])
 
 
-@pytest.mark.full
 def test_collinear_moves_are_bounded_by_one_move_of_the_whole_way(few_programmes: None) -> None:
     """Over D = 2 with v = 3, a = 8 and j = 60 it is D / v + v / a + a / j."""
     plan = planned([1.0, 1.2], [2.3, 1.2], zone=0.05)
@@ -337,7 +336,6 @@ def proven_share(seed: int) -> float | None:
     return least_duration(chain.chain, chain.duration) / chain.duration
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("seed", few(range(20), 1))
 def test_of_random_arms_it_is_never_above_the_motion_and_near(seed: int, few_programmes: None) -> None:
     share = proven_share(seed)

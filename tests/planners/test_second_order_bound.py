@@ -69,7 +69,6 @@ def test_collinear_moves_without_jerk_are_the_trapezoid_of_the_whole_way():
     assert 0.99 * exact <= bound_of(plan) <= exact
 
 
-@pytest.mark.full
 def test_the_smaller_the_zone_the_nearer_to_stopping():
     """In a ball of next to nothing the joints turn only where they hardly move."""
     limits = {"velocity": 3, "acceleration": 8}
@@ -79,7 +78,6 @@ def test_the_smaller_the_zone_the_nearer_to_stopping():
     assert 0.98 * sum(stops) <= bounds[0] <= sum(stops)
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("k", few([2.0, 0.5], 1))
 def test_limits_times_k_divide_it_by_k(k: float):
     faster = {"velocity": 3 * k, "acceleration": 8 * k**2, "jerk": 60 * k**3}

@@ -229,7 +229,7 @@ def faults_are_found(seeds: Sequence[int], ending: str, folder: Path) -> int:
     return jobs
 
 
-@pytest.mark.parametrize("ending", few(FORMATS, 3))
+@pytest.mark.parametrize("ending", FORMATS)
 def test_rows_with_a_fault_are_never_those_of_the_motion(ending: str, tmp_path: Path) -> None:
     first = list(FORMATS).index(ending)
     assert faults_are_found(few(range(first, 20, 2), 2), ending, tmp_path) >= 1
