@@ -214,6 +214,9 @@ def test_zones_signals_and_tools_are_found_in_any_move() -> None:
     of_all = job(plain, "zone: 0.01", "ur5e", start).job
     assert of_all.names_zones
     assert not of_all.with_stops().names_zones
+    stops = job(plain.replace("}}, {", "}, zone: stop}, {", 1), "zone: stop", "ur5e", start).job
+    assert [one.flies_by for one in (loaded, zoned, of_all, stops)] == [False, True, True, False]
+    assert stops.names_zones
     assert len(of_all.with_stops().moves) == 2
     other = job(
         f"{plain}, {{signal: a, value: 1}}, {{tool: {{xyz: [0, 0, 1]}}}}",

@@ -348,6 +348,20 @@ def test_a_motion_through_zones_is_no_slower_for_a_consumer_than_one_that_stops(
     assert alone[0].trajectory.duration < 0.99 * alone[1].trajectory.duration, "between its rows it is faster"
 
 
+def test_a_job_that_stops_at_its_corners_is_told_nothing_of_zones() -> None:
+    """`zone: stop` says what holds without a zone."""
+    moves = [{"planner": "jerk_limited", "to": {"joints": to + [0] * 4}} for to in ([0.5, 0.2], [0.2, 0.7])]
+    job = {**CORNER, "robot": {"joints": 6}, "start": {"joints": [0] * 6}, "moves": moves}
+    stopping, plain = (
+        plan_for(*job_for(job_from_text(json.dumps(job | zone)), "ur-servoj", {}), Writing())
+        for zone in ({"zone": "stop"}, {})
+    )
+    assert stopping.plan.events == plain.plan.events
+    assert stopping.duration == plain.duration > plain.shortest
+    assert stopping.plan.flyby is not None
+    assert plain.plan.flyby is None
+
+
 @pytest.mark.full
 def test_what_a_corner_flown_by_saves_is_told_by_the_rows_of_a_motion_that_stops() -> None:
     """Rows of whole periods make both a little longer: as often as not by another number of periods."""

@@ -196,7 +196,7 @@ def test_what_flies_by_corners_carries_what_it_could_hold_with_stops(monkeypatch
     flown, planned = plan_module.plan_job, list[bool]()
 
     def counted(loaded, *rest, **fields):  # type: ignore[no-untyped-def]
-        planned.append(loaded.job.names_zones)
+        planned.append(loaded.job.flies_by)
         return flown(loaded, *rest, **fields)
 
     monkeypatch.setattr("trajcli.planning.payload_capacity.plan_job", counted)

@@ -447,6 +447,11 @@ class Job(Model):
         """Whether a zone is named, for all corners or for one."""
         return self.zone is not None or any(move.zone is not None for move in self.moves)
 
+    @property
+    def flies_by(self) -> bool:
+        """Whether a zone leaves a corner without a stop there."""
+        return any(zone and not zone.stops for zone in (self.zone, *(move.zone for move in self.moves)))
+
     def with_stops(self) -> Job:
         """Return the job that stops at every corner."""
         stop = {"zone": None}

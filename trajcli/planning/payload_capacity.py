@@ -173,7 +173,7 @@ class _Search:
         Motions through zones are slowed until they keep efforts: as a rule the arm carries what it can with
         stops, which is found in a fraction of the time.
         """
-        if not self._loaded.job.names_zones:
+        if not self._loaded.job.flies_by:
             return None
         stopping = replace(self._loaded, job=self._loaded.job.with_stops())
         try:

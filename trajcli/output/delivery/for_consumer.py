@@ -278,11 +278,11 @@ class _Search:
     def slower(self, first: ForConsumer) -> ForConsumer:
         """Return the shortest motion that was found whose rows keep all; `first` where none was."""
         best: ForConsumer | None = None
-        for stretched in (True, False) if self._loaded.job.names_zones else (False,):
+        for stretched in (True, False) if self._loaded.job.flies_by else (False,):
             if stretched or best is None:
                 best = self._best_of([*self._candidates(first)], first, stretched=stretched)
         best = self._stretched(first, best) or best
-        stops = self._with_stops() if self._loaded.job.names_zones else None
+        stops = self._with_stops() if self._loaded.job.flies_by else None
         if stops is not None and not (best and best.duration < stops.duration):
             text = f"{stops.where}: no motion through the zones is faster than one that stops at the corners"
             return _with_event(stops, "not_faster", text)
@@ -363,7 +363,7 @@ class _Search:
         by_move = StretchedMoves(first.rows, rate, self._begun.fastest)
         longest = np.inf if best is None else best.duration
         count = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
-        for periods in range(1, min(count, _FEW_THROUGH_ZONES) if self._loaded.job.names_zones else count):
+        for periods in range(1, min(count, _FEW_THROUGH_ZONES) if self._loaded.job.flies_by else count):
             factor = 1 + periods / (rate * duration)
             if by_move.are_over(factor):
                 continue

@@ -162,7 +162,7 @@ class StretchedMoves:
         """
         plan, first = rows.plan, Adaptation()
         moves = [planned.get(first.key(move.index, move.start)) for move in plan.moves if move.duration > 0]
-        fit = not plan.loaded.job.names_zones and rows.interpolation is not None
+        fit = not plan.loaded.job.flies_by and rows.interpolation is not None
         self._moves = [move for move in moves if fit and move is not None and move.at_rest]
         self._rate, self._interpolation = rate, rows.interpolation or "linear"  # without one no move fits
         self._followed = {move.index: other for move, other in pairwise(moves) if move is not None}
