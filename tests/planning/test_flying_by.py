@@ -203,7 +203,7 @@ def test_what_a_small_zone_saves_falls_with_the_cube_root_of_its_radius(zone, sa
     assert plan.flyby.stopping - plan.flyby.duration == pytest.approx(saved, rel=0.01)
 
 
-@pytest.mark.parametrize("zone", [1e-4, 0.02, 0.3])
+@pytest.mark.parametrize("zone", [1e-4, 0.3])
 def test_moves_that_go_straight_on_are_one_move(zone):
     whole = duration(to(1.5, 1.3))
     three = [to(0.5, 1.2 + 0.1 / 6), to(0.9, 1.25), to(1.5, 1.3)]
@@ -219,13 +219,13 @@ def test_lines_that_go_straight_on_are_one_move_whichever_parameter_they_have(fa
     fields |= {"zone": {"joints": [0.05, 0.05]}, "start": {"joints": [0, 0], "velocity": [velocity] * 2}}
     along = {"synchronize": "phase"}
     want = duration(to(far, far, **along), to(2 * far, 2 * far), to(2 * far, 0), **fields)
-    for first, second in itertools.product((along, line), ({}, line)):
+    for first, second in few([(along, line), (line, {}), (line, line)], 2):
         moves = to(far, far, **first), to(2 * far, 2 * far, **second), to(2 * far, 0)
         assert duration(*moves, **fields) == pytest.approx(want, rel=1e-9)
 
 
 def test_a_larger_zone_is_never_slower():
-    found = [duration(zone=zone) for zone in (0.0, 3e-5, 5e-5, 1e-4, 0.003, 0.01, 0.03, 0.1, 0.3)]
+    found = [duration(zone=zone) for zone in (0.0, 3e-5, 1e-4, 0.02, 0.05, 0.3)]
     assert all(b <= a * (1 + 1e-4) for a, b in itertools.pairwise(found))
 
 
@@ -482,9 +482,10 @@ def test_rows_and_reports_say_where_zones_are(monkeypatch):
     monkeypatch.setattr(
         "trajcli.planners.flying_by.proven_bound._PROGRAMMES", ((0.005, 8),)
     )  # a bound, if none so close
-    plan = pick(20)
+    plan = flown(to(*CORNER), to(*END), to(0.3, 2.1), zone=20, units={"length": "mm"})
     report = report_of(plan)
     assert report.flyby is not None
+    assert [zone.move for zone in report.flyby.zones] == [0, 1]
     grid = UniformGrid(plan.trajectory.duration, 500, 0.0)
     rows = np.concatenate(list(sample(plan.trajectory, grid, ("t", "zone", "move"))))
     for zone in report.flyby.zones:

@@ -90,6 +90,7 @@ def _counted(job: str, at: int | None = None) -> tuple[PayloadCapacity, int]:
 )
 def test_few_masses_are_tried_and_the_next_larger_one_fails(job: str, most: int) -> None:
     """Where the motion is given its rows say which mass; else each has its own, and a line leads there."""
+    job = job.replace(LAST, "")
     found, tried = _counted(job.replace("MASS", "0.5"))
     assert tried <= most
     largest = float(found.mass or 0)
@@ -97,20 +98,23 @@ def test_few_masses_are_tried_and_the_next_larger_one_fails(job: str, most: int)
     assert not verifies(job, largest * (1 + 1e-6))
 
 
-TWO = CARRYING.replace("MASS", "1").replace(LAST, "") + (
-    "  - {attach: {mass: 2}}\n  - {planner: quintic, to: {joints: [0, 0]}, duration: 4}\n"
-)
-
-
 def test_of_several_payloads_the_one_that_is_meant() -> None:
     """The others keep the mass that the job says, also where that is too much."""
-    alone, last, every = (payload_capacity(job_from_text(TWO), at) for at in (2, 5, None))
-    assert (alone.moves, last.moves, every.moves) == ((1, 2), (4, 5), (1, 2, 4, 5))
+    bounds, coms = np.array([90, 30]), ((0.06, 0.02), (0.0, 0.0))
+    text = HEAD + "limits: {effort: {a: 90, b: 30}}\nstart: {joints: [0, 20]}\nmoves:\n"
+    text += "  - {attach: {mass: 1, com: [60, 20, 0]}}\n  - {planner: hold, duration: 1}\n  - {detach: {}}\n"
+    text += "  - {attach: {mass: 2}}\n  - {planner: hold, duration: 1}\n"
+    alone, last, every = (payload_capacity(job_from_text(text), at) for at in (1, 4, None))
+    assert (alone.moves, last.moves, every.moves) == ((0, 1), (3, 4), (0, 1, 3, 4))
+    for found, com in zip((alone, last), coms, strict=True):
+        own, each = torques((0, 20), com)
+        assert found.mass == pytest.approx(((bounds - own) / each).min(), rel=2e-6)
     assert every.mass == pytest.approx(min(alone.mass or 0, last.mass or 0), rel=1e-6)
     assert (every.com, last.com) == (None, pytest.approx([0, 0, 0]))
     with pytest.raises(TrajcliError):
-        payload_capacity(job_from_text(TWO.replace("{mass: 2}", "{mass: 200}")), 2)
-    (one,) = payload_capacity(job_from_text(EMPTY), 0).moves
+        payload_capacity(job_from_text(text.replace("{mass: 2}", "{mass: 200}")), 1)
+    second = "  - {planner: hold, duration: 1}\n"
+    (one,) = held((0, 20), "{a: 90, b: 30}", second, 0).moves
     assert one == 0
 
 
@@ -132,8 +136,11 @@ def test_only_limits_where_something_is_carried_count() -> None:
 
 
 @pytest.mark.parametrize("target", [(160, 0), (20, 0)])
-def test_where_gravity_alone_binds_its_time_is_that_of_the_pose(target: Sequence[float]) -> None:
+def test_where_gravity_alone_binds_its_time_is_that_of_the_pose(
+    target: Sequence[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A free duration is no help: where the arm reaches out furthest, at one end of the move."""
+    monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 1e-6)
     text = HEAD + "limits: {effort: {a: [-40, 60], b: 9}}\nstart: {joints: [90, 0]}\nmoves:\n"
     text += "  - {attach: {mass: 1}}\n  - {planner: hold, duration: 0.5}\n"
     text += f"  - {{planner: quintic, to: {{joints: {list(target)}}}}}\n  - {{planner: hold, duration: 1}}\n"

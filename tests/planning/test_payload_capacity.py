@@ -283,7 +283,7 @@ def test_a_duration_that_binds_is_the_cause(tmp_path, capsys, monkeypatch) -> No
 
 def test_the_command_for_people_and_programs(tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
     job = tmp_path / "job.yaml"
-    job.write_text(CARRYING.replace("MASS", "0.5"))
+    job.write_text(CARRYING.replace("MASS", "0.5").replace(LAST, ""))
     assert run_payload(PayloadCommand(job=str(job), as_json=True)) == 0
     told = json.loads(capsys.readouterr().out)
     assert list(told) == ["mass", "joint", "move", "time", "effort", "limit", "cause", "com", "moves"]

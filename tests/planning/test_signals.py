@@ -31,6 +31,13 @@ HEAD: dict[str, Any] = {
     "start": {"joints": [0, -90, 90, -90, -90, 0]},
 }
 LAW = {"shape": "time_optimal", "speed": 250}
+PLAIN = {"law": {"shape": "quintic", "duration": 0.5}}
+SLIDES = [{"type": "prismatic", "theta": theta, "alpha": alpha} for theta, alpha in ((0, -90), (-90, -90), (0, 0))]
+GANTRY: dict[str, Any] = {
+    "robot": {"convention": "standard", "joints": SLIDES},
+    "limits": {"velocity": 1000, "acceleration": 3000},
+    "start": {"joints": [100, 200, 300]},
+}
 
 
 def line(*xyz: float, **fields: Any) -> dict[str, Any]:
@@ -107,11 +114,9 @@ def test_between_two_zones_each_length_is_passed_where_the_tool_is_nearest_to_it
     lengths = (4.0, 40.0, -3.0)
     some = [at({"path": length}, value=k) for k, length in enumerate(lengths, 1)]
     moves = [line(0, 0, 80, zone=20, at=at()), line(80, 0, 0, zone=15, at=[*some, at("enter", value=9)])]
-    plan = planned(
-        *moves, line(0, 60, 0, at=at("nearest", value=7)), limits={"acceleration": 800, "jerk": None}
-    )
+    plan = planned(*moves, line(0, 60, 0, at=at("nearest", value=7)), **GANTRY)
     (first, second), end = plan.trajectory.zones, plan.trajectory.duration
-    corner = planned(line(0, 0, 80), line(80, 0, 0), limits={"acceleration": 800, "jerk": None})
+    corner = planned(line(0, 0, 80, **PLAIN), line(80, 0, 0, **PLAIN), **GANTRY)
     where, to = tool(corner, corner.moves[0].duration, corner.trajectory.duration)
     set_at = dict(zip([c.value for c in plan.trajectory.signals[0].changes], times_of(plan), strict=True))
     for value, length, within in zip((1, 2, 3), lengths, (first, (first[1], second[0]), second), strict=True):
@@ -130,16 +135,16 @@ def test_between_two_zones_each_length_is_passed_where_the_tool_is_nearest_to_it
 
 
 def test_lengths_count_from_both_ends_and_times_from_the_arrival() -> None:
-    alone = planned(line(0, 0, 80, at=[at({"path": 0}), at({"path": -80}, value=2)]))
+    alone = planned(line(0, 0, 80, at=[at({"path": 0}), at({"path": -80}, value=2)], **PLAIN))
     assert times_of(alone) == pytest.approx([0.0, 0.0], abs=1e-5)
     with pytest.raises(InputError, match="is set 81 mm along its path, which is 80 mm long"):
-        planned(line(0, 0, 80, at=at({"path": -81})))
+        planned(line(0, 0, 80, at=at({"path": -81}), **PLAIN))
     arrival = alone.trajectory.duration
     for before, time in [(arrival + 5e-13, 0.0), (-5e-13, arrival), (arrival, 0.0), (0.0, arrival)]:
-        assert times_of(planned(line(0, 0, 80, at=at("leave", before)))) == [time]
+        assert times_of(planned(line(0, 0, 80, at=at("leave", before), **PLAIN))) == [time]
     for before in (arrival + 5e-4, -5e-4):
         with pytest.raises(InputError, match="outside of the job"):
-            planned(line(0, 0, 80, at=at("leave", before)))
+            planned(line(0, 0, 80, at=at("leave", before), **PLAIN))
 
 
 @pytest.mark.full
@@ -157,7 +162,7 @@ def test_the_whole_length_of_a_path_is_within_it_however_it_is_rounded(length: f
 
 def test_at_the_end_the_path_is_that_of_the_move_that_ends_there() -> None:
     """Neither of what follows without length, nor of a line to where the arm is."""
-    plan = planned(line(0, 100, 0), line(0, 0, 0), {"signal": "s", "value": 1})
+    plan = planned(line(0, 100, 0, **PLAIN), line(0, 0, 0, **PLAIN), {"signal": "s", "value": 1})
     end = ListedGrid(plan.trajectory.duration, np.array([plan.trajectory.duration]))
     row = np.concatenate(list(sample(plan.trajectory, end, ("path", "move"))))[0]
     assert row == pytest.approx([0.1, 0.0, 0.0, 0.0], abs=1e-9)
@@ -259,9 +264,9 @@ def test_rows_whose_signal_is_another_are_none_of_the_plan(
 @pytest.mark.parametrize(
     ("moves", "fields", "line_of", "words"),
     [
-        ([line(0, 0, 80, at=at({"path": 90}))], {}, "at", "90 mm along its path, which is 80 mm long"),
-        ([line(0, 0, 80, at=[at(), at("leave", 9)])], {}, "at", "outside of the job"),
-        ([line(0, 0, 80, at=[at("leave", -0.1)])], {}, "at", "outside of the job"),
+        ([line(0, 0, 80, at=at({"path": 90}), **PLAIN)], {}, "at", "90 mm along its path, which is 80 mm long"),
+        ([line(0, 0, 80, at=[at(), at("leave", 9)], **PLAIN)], {}, "at", "outside of the job"),
+        ([line(0, 0, 80, at=[at("leave", -0.1)], **PLAIN)], {}, "at", "outside of the job"),
         ([line(0, 0, 80, at=at("arrive"))], {}, "at", "expected enter, nearest, leave or {path: L}"),
         ([line(0, 0, 80, at=[at(), {"signal": "s"}])], {}, "at", "`value` is missing"),
         ([line(0, 0, 80, at={**at(), "time": 3})], {}, "at", "a signal has no 'time'"),

@@ -32,6 +32,7 @@ LARGEST = 1e6
 """What no arm carries, kg."""
 _CLOSE = 1e-10  # relative: width at which a bracket is closed
 _GUESS = 1e-4  # relative: how near the rows of a plan come to its mass
+_ALLOWED = (0.0, EFFORT_RELATIVE)  # what gravity alone may take beyond a limit: none, or that of a verdict
 _EACH = 64  # rows of a piece
 
 
@@ -207,36 +208,30 @@ class _Search:
     def closed(self, low: float, high: float) -> tuple[float, float]:
         """Return the bracket as narrow as it gets.
 
-        Where the motion is the same at both ends only its efforts change between them. Else masses are tried
-        beside the one where the line through what two too large ones take meets the limit.
+        Masses are tried beside the one where the line through what two too large ones take meets the limit.
+        Where the motion is the same at both ends only its efforts change between them.
         """
-        below, above = self.attempt(low), self.attempt(high)
-        motion = below if _same_motion(below, above) else None
-        if motion is None and high > low * (1 + _CLOSE):
-            self.attempt(high * (1 + _GUESS))
-        beside = _CLOSE / 4
+        below, further, beside = self.attempt(low), high * (1 + _GUESS), _CLOSE / 4
+        motion = below if _same_motion(below, self.attempt(high)) else None
         while high - low > _CLOSE * high:
-            middle = 0.5 * (low + high)
-            root = middle if motion is not None else self._mass_of_line(high)
-            lower, upper = root * (1 - beside), root * (1 + beside)
-            if low < root < high:
-                middle = lower if lower > low else upper if upper < high else middle
-                beside *= 4
-            verifies = self.passes(middle) if motion is None else self._keeps_efforts(motion, middle)
-            low, high = (middle, high) if verifies else (low, middle)
+            middle, x, y = 0.5 * (low + high), self._over(high, motion), self._over(further, motion)
+            for allowed in _ALLOWED:
+                root = 0.0 if x == y else high - (x - allowed) * (further - high) / (y - x)
+                lower, upper = root * (1 - beside), root * (1 + beside)
+                if low < root < high:
+                    middle = lower if lower > low else upper if upper < high else middle
+                    beside *= 4
+                    break
+            if self.passes(middle) if motion is None else self._over(middle, motion) <= 0:
+                low = middle
+            else:
+                high, further = middle, high
         return low, high
 
-    def _mass_of_line(self, high: float) -> float:
-        """Return the mass of the limit, on the line through the efforts of the two least that fail."""
-        masses = sorted(mass for mass in self._plans if mass >= high)[:2]
-        over = [self._over(mass) for mass in masses]
-        if len(over) < 2 or over[0] == over[1]:
-            return 0.0
-        (a, b), (x, y) = masses, over
-        return a - x * (b - a) / (y - x)
-
-    def _over(self, mass: float) -> float:
-        """Return by which part of an effort limit a mass that fails is over it; 0 for other limits."""
+    def _over(self, mass: float, motion: Plan | TrajcliError | None) -> float:
+        """Return by which part of an effort limit a mass is over it: in a motion, or failing; else 0."""
+        if isinstance(motion, Plan):
+            return self._share(motion, mass) - 1.0 - EFFORT_RELATIVE
         failed = self.attempt(mass)
         if isinstance(failed, Plan):
             shares = [f.excess for f in failed.verdict.findings if f.kind == "effort"]
@@ -244,20 +239,17 @@ class _Search:
         value, limit = failed.problems[0].value, failed.problems[0].limit
         return value / limit - 1.0 if value and limit else 0.0
 
-    def _keeps_efforts(self, plan: Plan | TrajcliError, mass: float) -> bool:
-        """Return whether the efforts of a plan keep their limits with another mass."""
-        if not isinstance(plan, Plan):
-            return False
+    def _share(self, plan: Plan, mass: float) -> float:
+        """Return the largest share of a limit that the efforts of a plan have with another mass."""
+        share = 0.0
         for index in self.moves:
             move, own = plan.moves[index], self._carriers[index]
             robot = replace(move.robot, payload=Payload(mass, own.com, own.inertia))
-            if not robot.limits.has_effort:
-                continue
-            span = plan.trajectory.spans[index]
-            efforts = EffortFamily().survey(LimitedMove(plan.trajectory, span, robot.limits, robot))
-            if efforts is not None and efforts.share() > 1 + EFFORT_RELATIVE:
-                return False
-        return True
+            if robot.limits.has_effort:
+                span = plan.trajectory.spans[index]
+                efforts = EffortFamily().survey(LimitedMove(plan.trajectory, span, robot.limits, robot))
+                share = max(share, 0.0 if efforts is None else efforts.share())
+        return share
 
     def result(self, low: float, high: float) -> PayloadCapacity:
         """Return the capacity within a bracket, and what binds: what fails at its upper end."""
