@@ -264,7 +264,7 @@ def of_term(term: Term) -> tuple[InverseDynamics, np.ndarray]:
 
 def largest_coefficients(dynamics: InverseDynamics, motion: np.ndarray, length: float) -> np.ndarray:
     """Return the largest Taylor coefficients of the efforts at times of a motion, (ORDERS, n)."""
-    times = np.linspace(0.0, length, 9)
+    times = np.linspace(0.0, length, 9 if length > 1e-6 else 1)
     return np.max([np.abs(effort_series(dynamics, motion, t, ORDERS)) for t in times], axis=0)
 
 

@@ -162,7 +162,7 @@ def test_the_whole_length_of_a_path_is_within_it_however_it_is_rounded(length: f
 
 def test_at_the_end_the_path_is_that_of_the_move_that_ends_there() -> None:
     """Neither of what follows without length, nor of a line to where the arm is."""
-    plan = planned(line(0, 100, 0, **PLAIN), line(0, 0, 0, **PLAIN), {"signal": "s", "value": 1})
+    plan = planned(line(0, 100, 0, **PLAIN), line(0, 0, 0), {"signal": "s", "value": 1})
     end = ListedGrid(plan.trajectory.duration, np.array([plan.trajectory.duration]))
     row = np.concatenate(list(sample(plan.trajectory, end, ("path", "move"))))[0]
     assert row == pytest.approx([0.1, 0.0, 0.0, 0.0], abs=1e-9)
