@@ -74,8 +74,8 @@ def test_no_admissible_control_is_inside_sooner_for_good(seed):
         bias = rng.uniform(0, 1)
         entered = None
         while time < known.velocity * (1 - 1e-9):
-            j = np.clip(rng.normal(-side * bias * jerk, jerk / 2), -jerk, jerk)
-            j = np.clip(j, (bounds[1, 0] - a) / step, (bounds[1, 1] - a) / step)
+            j = min(max(rng.normal(-side * bias * jerk, jerk / 2), -jerk), jerk)
+            j = min(max(j, (bounds[1, 0] - a) / step), (bounds[1, 1] - a) / step)
             v, a, time = v + a * step + j * step**2 / 2, a + j * step, time + step
             if entered is None and side * (v - bound) < -1e-9 and time < known.velocity * (1 - 1e-9):
                 entered = v + a * abs(a) / (2 * jerk) if side * a < 0 else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import comb, factorial
 
 import numpy as np
@@ -93,14 +94,19 @@ def of_powers(rate):
     return known
 
 
+@cache
+def survey_of_wave(rate):
+    breaks = np.array([0.1, 0.4, 1.0, 1.3])
+    pieces = breaks[:-1], np.diff(breaks), np.stack([np.ones((3, 1)), breaks[:-1, None]])
+    return node_survey(of_powers(rate), pieces, lambda _: np.array([1e-8]), 12)
+
+
 @pytest.mark.parametrize("rate", [1.0, 7.0, 40.0])
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("entry", [0, 1])
 def test_the_largest_of_a_wave_is_found_and_bounded(rate, sign, entry):
     """cos and sin of rate t over three pieces: 1, unless the way there is too short."""
-    breaks = np.array([0.1, 0.4, 1.0, 1.3])
-    pieces = breaks[:-1], np.diff(breaks), np.stack([np.ones((3, 1)), breaks[:-1, None]])
-    survey = node_survey(of_powers(rate), pieces, lambda _: np.array([1e-8]), 12)
+    survey = survey_of_wave(rate)
     assert (survey.remainder <= 1e-8).all()
     assert survey.lengths.sum() == pytest.approx(1.2)
     weights = sign * np.eye(2)[entry]

@@ -6,6 +6,8 @@ that the bound may be neither above nor below it.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -71,9 +73,10 @@ SHAPES = [
 ]  # distance and jerk: long and short ramps, with cruise
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("rates", RATES)
-@pytest.mark.parametrize("speeds", SPEEDS)
+@pytest.mark.parametrize(
+    ("speeds", "rates", "shape"),
+    [each for k, each in enumerate(product(SPEEDS, RATES, SHAPES)) if (k + k // len(SHAPES)) % 2 == 0],
+)
 def test_moving_ends_have_free_accelerations(speeds, rates, shape):
     """Up and down: what speeds up one way slows down the other way."""
     distance, jerk = shape

@@ -69,7 +69,7 @@ def test_between_rows_the_tool_is_as_near_as_is_said(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("degree", [5, 9])
 def test_no_peak_hides_between_rows(name: str, degree: int) -> None:
     robot = load_robot(name)
-    for _ in range(4):
+    for _ in few(range(4), 2):
         lengths = RNG.uniform(0.05, 1.0, size=3)
         breaks = np.concatenate([[0.0], np.cumsum(lengths)])
         coefficients = RNG.normal(size=(degree + 1, 3, len(robot.joints))) * 0.8

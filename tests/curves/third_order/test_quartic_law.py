@@ -78,7 +78,7 @@ def test_where_a_law_goes_back_is_known_and_named(acceleration, piece, exists):
     forward = [k != piece for k in range(4)]
     assert law.forward.tolist() == forward
     if exists:
-        t = np.linspace(0.0, 1.0, 1001)
+        t = np.linspace(0.0, 1.0, 101)
         lowest = [min(state(law, k, share)[1] for share in t) for k in range(4)]
         assert all(speed >= -1e-12 for speed, leads in zip(lowest, forward, strict=True) if leads)
     if piece is None:

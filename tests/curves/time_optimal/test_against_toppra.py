@@ -13,7 +13,7 @@ from trajcli.curves.operations import compose
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.parameterization import time_optimal
 
-GRID = 8000
+GRID = 3000
 
 
 def toppra_duration(path, waypoints, s, velocity, acceleration, grid=GRID):

@@ -35,8 +35,10 @@ def fastest(length, v, up, down, v0=0.0, v1=0.0):
     return (peak - v0) / up + (peak - v1) / down + (length - ramps) / peak
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e4, 1e-4, 7.3])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    ("seed", "scale"),
+    [(seed, (1.0, 1e4, 1e-4, 7.3)[(seed // 2 + k) % 4]) for seed in range(8) for k in (0, 2)],
+)
 def test_straight_lines_take_the_least_time(seed, scale):
     rng = np.random.default_rng(seed)
     delta = rng.uniform(-2, 2, 3)

@@ -92,7 +92,7 @@ def forward_by_programmes(path, grid, velocity, acceleration, upper, start):
 @pytest.mark.parametrize("moving", [False, True])
 def test_the_passes_solve_the_linear_programmes(seed, moving):
     rng = np.random.default_rng(seed)
-    joints, count = int(rng.integers(1, 4)), 30
+    joints, count = int(rng.integers(1, 4)), 12
     path = spline(rng.uniform(-1, 1, (5, joints)))
     if seed % 2:  # q'' jumps at the breaks
         path = hermite_pieces(path.breaks, rng.uniform(-2, 2, (2, 5, joints)))
