@@ -29,7 +29,7 @@ def findings(move: Trajectory, of: Limits) -> list[Finding]:
 
 def sampled_use(curve: PiecewisePolynomial) -> float:
     """Return the largest v / (sqrt(2 d x) - o) by its definition at many times."""
-    t = np.linspace(curve.start, curve.end, 400_001)
+    t = np.linspace(curve.start, curve.end, 40_001)
     q, v = curve.evaluate(t)[:, 0], curve.evaluate(t, 1)[:, 0]
     bound = np.sqrt(2 * D * np.where(v > 0, END - q, q + END)) - OFFSET
     return float((np.abs(v) / bound).max())

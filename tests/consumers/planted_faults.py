@@ -88,11 +88,12 @@ def blocks(rows: RecordedMotion, size: int) -> list[RecordedMotion]:
 def judged(rows: RecordedMotion, profile: str, around: Surroundings | None = None) -> ProfileJudgement:
     """Return what a profile says of the motion, in one block and in blocks of several sizes alike."""
     around = around or surroundings(rows.q.shape[1])
-    whole = judge_by_profile([rows], load_profile(profile), around)
-    for size in (1, 7, 333):
-        if size == 1 and rows.t.size > (200 if QUICK else 1500):
+    rules = load_profile(profile)
+    whole = judge_by_profile([rows], rules, around)
+    for size in (1, 7, 61, 333):
+        if not size < rows.t.size <= size * (50 if QUICK else 1500):
             continue
-        parts = judge_by_profile(blocks(rows, size), load_profile(profile), around)
+        parts = judge_by_profile(blocks(rows, size), rules, around)
         assert parts.findings == whole.findings, size
     return whole
 
