@@ -32,7 +32,9 @@ HEAD: dict[str, Any] = {
 }
 LAW = {"shape": "time_optimal", "speed": 250}
 PLAIN = {"law": {"shape": "quintic", "duration": 0.5}}
-SLIDES = [{"type": "prismatic", "theta": theta, "alpha": alpha} for theta, alpha in ((0, -90), (-90, -90), (0, 0))]
+SLIDES = [
+    {"type": "prismatic", "theta": theta, "alpha": alpha} for theta, alpha in ((0, -90), (-90, -90), (0, 0))
+]
 GANTRY: dict[str, Any] = {
     "robot": {"convention": "standard", "joints": SLIDES},
     "limits": {"velocity": 1000, "acceleration": 3000},
@@ -264,7 +266,12 @@ def test_rows_whose_signal_is_another_are_none_of_the_plan(
 @pytest.mark.parametrize(
     ("moves", "fields", "line_of", "words"),
     [
-        ([line(0, 0, 80, at=at({"path": 90}), **PLAIN)], {}, "at", "90 mm along its path, which is 80 mm long"),
+        (
+            [line(0, 0, 80, at=at({"path": 90}), **PLAIN)],
+            {},
+            "at",
+            "90 mm along its path, which is 80 mm long",
+        ),
         ([line(0, 0, 80, at=[at(), at("leave", 9)], **PLAIN)], {}, "at", "outside of the job"),
         ([line(0, 0, 80, at=[at("leave", -0.1)], **PLAIN)], {}, "at", "outside of the job"),
         ([line(0, 0, 80, at=at("arrive"))], {}, "at", "expected enter, nearest, leave or {path: L}"),
