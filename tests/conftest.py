@@ -7,6 +7,7 @@ each time. How many there are is said by `tiers`.
 import gc
 import os
 import signal
+from contextlib import suppress
 from functools import cache
 from typing import Any
 
@@ -24,6 +25,11 @@ from tiers import QUICK, TIER, few_examples
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("new", deadline=None)
 settings.load_profile("new" if TIER == "soak" else "fixed")
+if TIER != "soak":  # nor does an example depend on which files of trajcli the tests before it have loaded
+    with suppress(ImportError):
+        from hypothesis.internal.conjecture import providers
+
+        providers._get_local_constants = lambda: providers._local_constants
 typer.main.get_command = cache(typer.main.get_command)  # it makes all commands: longer than what most do
 ASKED = "_hypothesis_internal_use_settings"
 
