@@ -70,6 +70,7 @@ def test_rows_that_their_consumer_refuses(
     code, _, err = call(capfd, "plan", job(tmp_path, text), "--for", profile, "-o", str(target))
     assert code == 1
     assert f"error: {rule}: " in err
+    assert "slower motion" not in err, "none has other joints"
     assert not target.exists()
 
 
