@@ -48,16 +48,15 @@ def no_code_is_dead(sources: Sources) -> Iterator[Offence]:
 
 def _named_in_texts(sources: Sources, path: str) -> Iterator[str]:
     """Yield the names of what tables load when it is asked for: "module.Name"."""
-    for node in sources.nodes[path]:
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and DOTTED.fullmatch(node.value):
+    for node in sources.nodes(path, ast.Constant):
+        if isinstance(node.value, str) and DOTTED.fullmatch(node.value):
             yield node.value.rpartition(".")[2]
 
 
 def _set_on_others(sources: Sources, path: str) -> Iterator[tuple[str, str]]:
     """Yield attributes that are set on values of libraries, such as ruckig's problem, which reads them."""
-    for node in sources.nodes[path]:
-        set_here = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
-        if set_here and ast.unparse(node.value) != "self":
+    for node in sources.nodes(path, ast.Attribute):
+        if isinstance(node.ctx, ast.Store) and ast.unparse(node.value) != "self":
             yield "attribute", node.attr
 
 

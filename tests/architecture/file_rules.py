@@ -74,8 +74,8 @@ def small_files_have_more_than_one_reader(sources: Sources) -> Iterator[Offence]
 def _named_in_tables(sources: Sources, path: str) -> Iterator[Import]:
     """Yield what a package's `__init__` loads by name when it is asked for."""
     if is_init(path):
-        for node in sources.nodes[path]:
-            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        for node in sources.nodes(path, ast.Constant):
+            if isinstance(node.value, str):
                 for name in (node.value, f"{sources.modules[path]}.{node.value}"):
                     module, _, attribute = name.rpartition(".")
                     yield Import(module, attribute, "", node.lineno, "function")

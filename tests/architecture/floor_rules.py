@@ -172,35 +172,28 @@ def planners_are_known_by_their_contract(sources: Sources) -> Iterator[Offence]:
 def tags_of_planners_are_not_compared(sources: Sources) -> Iterator[Offence]:
     tags = tags_of_planners(sources)
     for path in _above_planners(sources):
-        for node in sources.nodes[path]:
+        for node in sources.nodes(path, ast.Compare, ast.MatchValue):
             for text in _compared(node):
                 if text in tags:
-                    yield Offence(f"{path} {text}", f"line {_line(node)} compares with the name of a planner")
-
-
-def _line(node: ast.AST) -> int:
-    return getattr(node, "lineno", 0)
+                    yield Offence(f"{path} {text}", f"line {node.lineno} compares with the name of a planner")
 
 
 def tags_of_planners(sources: Sources) -> set[str]:
     """Return the names of the planners in jobs, the keys of the table `_WHERE`."""
     return {
         key.value
-        for node in sources.nodes.get("planners/__init__.py", [])
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_WHERE"
+        for path in sources.texts.keys() & {"planners/__init__.py"}
+        for node in sources.nodes(path, ast.Assign)
+        if ast.unparse(node.targets[0]) == "_WHERE"
         if isinstance(node.value, ast.Dict)
         for key in node.value.keys
         if isinstance(key, ast.Constant) and isinstance(key.value, str)
     }
 
 
-def _compared(node: ast.AST) -> Iterator[object]:
+def _compared(node: ast.Compare | ast.MatchValue) -> Iterator[object]:
     """Yield the literals that a comparison compares with, also those within a tuple, list or set."""
-    sides: list[ast.expr] = []
-    if isinstance(node, ast.Compare):
-        sides = [node.left, *node.comparators]
-    elif isinstance(node, ast.MatchValue):
-        sides = [node.value]
+    sides = [node.left, *node.comparators] if isinstance(node, ast.Compare) else [node.value]
     for side in sides:
         members = side.elts if isinstance(side, ast.Tuple | ast.List | ast.Set) else [side]
         yield from (member.value for member in members if isinstance(member, ast.Constant))

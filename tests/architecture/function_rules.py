@@ -12,10 +12,9 @@ LONG_FUNCTION, LONGEST_FUNCTION, SHORT_SHARE = 30, 45, 0.9
 
 def _lengths(sources: Sources) -> Iterator[tuple[str, str, int]]:
     """Yield file, line with name, and number of body lines of every function."""
-    for path, nodes in sources.nodes.items():
-        for node in nodes:
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                yield path, f"{node.name} in line {node.lineno}", body_lines(node)
+    for path in sources.texts:
+        for node in sources.nodes(path, ast.FunctionDef, ast.AsyncFunctionDef):
+            yield path, f"{node.name} in line {node.lineno}", body_lines(node)
 
 
 def body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
@@ -45,8 +44,8 @@ def annotations_are_never_evaluated_at_import(sources: Sources) -> Iterator[Offe
 
 
 def frozen_values_share_their_methods(sources: Sources) -> Iterator[Offence]:
-    for path, nodes in sources.nodes.items():
-        for node in (node for node in nodes if isinstance(node, ast.ClassDef)):
+    for path in sources.texts:
+        for node in sources.nodes(path, ast.ClassDef):
             for decorator in node.decorator_list:
                 text = ast.unparse(decorator)
                 if text.split("(")[0].endswith("dataclass") and "frozen=True" in text:

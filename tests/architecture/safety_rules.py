@@ -16,8 +16,8 @@ def nothing_runs_text_or_opens_a_connection(sources: Sources) -> Iterator[Offenc
         for imported in imports:
             for name in sorted({imported.module, imported.dotted} & FORBIDDEN):
                 yield Offence(path, f"line {imported.line} imports {name}")
-        for node in sources.nodes[path]:
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in RUN_TEXT:
+        for node in sources.nodes(path, ast.Call):
+            if isinstance(node.func, ast.Name) and node.func.id in RUN_TEXT:
                 yield Offence(path, f"line {node.lineno} calls {node.func.id}")
 
 

@@ -6,9 +6,9 @@ import ast
 import re
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from sources import ROOT, the_sources
+
 PAGE = ROOT / "docs" / "architecture.md"
 MOST_LINES = 120  # two pages
 OUTSIDE = {"N", "X"}
@@ -22,8 +22,8 @@ def quoted(text: str) -> set[str]:
 def classes() -> set[str]:
     return {
         node.name if isinstance(node, ast.ClassDef) else ast.unparse(node.targets[0])
-        for path in (ROOT / "trajcli").rglob("*.py")
-        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        for tree in the_sources().trees.values()
+        for node in tree.body
         if isinstance(node, ast.ClassDef | ast.Assign)
     }
 

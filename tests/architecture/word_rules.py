@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 
 from sources import HOUSE, ROOT, Offence, Planted, Rule, Sources
 
@@ -136,19 +137,17 @@ def titles_are_noun_phrases(sources: Sources) -> Iterator[Offence]:
 
 
 def names_are_words_of_the_field(sources: Sources) -> Iterator[Offence]:
-    for path, nodes in sources.nodes.items():
+    for path in sources.texts:
         for word in _private(sources, path, words_of(path.removesuffix(".py"))):
             yield Offence(path, f"the file's name says `{word}`")
-        names = {(name, line) for node in nodes for name, line in _defined(node)}
-        for name, line in sorted(names, key=lambda each: (each[1], each[0])):
+        for line, name in _defined(sources, path):
             for word in _private(sources, path, words_of(name)):
                 yield Offence(f"{path} {name}", f"line {line} says `{word}`")
 
 
 def proofs_say_what_their_arrays_are(sources: Sources) -> Iterator[Offence]:
-    for path in sorted(sources.nodes.keys() & {*PROOFS}):
-        names = {(line, name) for node in sources.nodes[path] for name, line in _defined(node)}
-        for line, name in sorted(names):
+    for path in sorted(sources.texts.keys() & {*PROOFS}):
+        for line, name in _defined(sources, path):
             if better := WORDS_OF_PROOFS.get(name.strip("_")):
                 yield Offence(f"{path} {name}", f"line {line} says `{name}`, not `{better}`")
 
@@ -160,20 +159,29 @@ def _private(sources: Sources, path: str, words: list[str]) -> list[str]:
     return sorted({*words} & {*PRIVATE_WORDS, *PLACE}.difference(free))
 
 
-def _defined(node: ast.AST) -> Iterator[tuple[str, int]]:
-    """Yield the names that a node defines, each with its line."""
-    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-        yield node.name, node.lineno
-    elif isinstance(node, ast.arg):
-        yield node.arg, node.lineno
-    elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-        yield node.id, node.lineno
-    elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
-        yield node.attr, node.lineno
-    elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and node.name:
-        yield node.name, node.lineno
-    elif isinstance(node, ast.ImportFrom | ast.Import):
-        yield from ((alias.asname, node.lineno) for alias in node.names if alias.asname)
+@cache
+def _defined(sources: Sources, path: str) -> list[tuple[int, str]]:
+    """Return the names that a file defines, each with its line, in order."""
+    found = {
+        (node.lineno, node.name)
+        for kind in (
+            ast.FunctionDef,
+            ast.AsyncFunctionDef,
+            ast.ClassDef,
+            ast.ExceptHandler,
+            ast.MatchAs,
+            ast.MatchStar,
+        )
+        for node in sources.nodes(path, kind)
+        if node.name
+    }
+    found |= {(node.lineno, node.arg) for node in sources.nodes(path, ast.arg)}
+    names, attributes = sources.nodes(path, ast.Name), sources.nodes(path, ast.Attribute)
+    found |= {(node.lineno, node.id) for node in names if isinstance(node.ctx, ast.Store)}
+    found |= {(node.lineno, node.attr) for node in attributes if isinstance(node.ctx, ast.Store)}
+    for node in [*sources.nodes(path, ast.ImportFrom), *sources.nodes(path, ast.Import)]:
+        found |= {(node.lineno, alias.asname) for alias in node.names if alias.asname}
+    return sorted(found)
 
 
 _TITLE = '"""Retiming of planned moves: time scaling.\n\nWhat it says after that is free.\n"""\n'
