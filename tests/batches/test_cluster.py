@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -16,9 +15,11 @@ from typing import Any
 import pytest
 from extras import require_module
 
+from trajcli.batches import cluster as on_workers
+from trajcli.batches.task import JobOutcome, Task
 from trajcli.cli.app import app
 
-COMMAND = [sys.executable, "-m", "trajcli", "batch"]
+Capture = pytest.CaptureFixture[str]
 JOB = """\
 version: 1
 units: {angle: deg}
@@ -52,23 +53,27 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def run(*words: str) -> tuple[int, dict[str, dict[str, Any]], str]:
+def run(capfd: Capture, *words: str) -> tuple[int, dict[str, dict[str, Any]], str]:
     """Run a batch; return its exit code, its lines by the stems of the jobs, and standard error."""
-    done = subprocess.run([*COMMAND, *words], capture_output=True, text=True, timeout=300, check=False)
-    values = [json.loads(line) for line in done.stdout.splitlines()]
-    return done.returncode, {Path(value["job"]).stem: value for value in values}, done.stderr
+    capfd.readouterr()
+    with pytest.raises(SystemExit) as left:
+        app(["batch", *words])
+    out, err = capfd.readouterr()
+    values = [json.loads(line) for line in out.splitlines()]
+    code: Any = left.value.code
+    return code, {Path(value["job"]).stem: value for value in values}, err
 
 
-def on(cluster: Any, *words: str) -> tuple[int, dict[str, dict[str, Any]], str]:
-    return run(*words, "--engine", "dask", "--scheduler", cluster.scheduler_address)
+def on(capfd: Capture, cluster: Any, *words: str) -> tuple[int, dict[str, dict[str, Any]], str]:
+    return run(capfd, *words, "--engine", "dask", "--scheduler", cluster.scheduler_address)
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_cluster_does_what_processes_do(cluster: Any) -> None:
-    code, found, err = on(cluster, "jobs", "-o", "out")
+def test_a_cluster_does_what_processes_do(cluster: Any, capfd: Capture) -> None:
+    code, found, err = on(capfd, cluster, "jobs", "-o", "out")
     assert code == 1
     assert "3 jobs: 2 written, 1 failed, " in err
-    _, expected, _ = run("jobs", "-o", "other")
+    _, expected, _ = run(capfd, "jobs", "-o", "other", "-j", "1")
     for values in (found, expected):
         for value in values.values():
             del value["seconds"]
@@ -77,16 +82,14 @@ def test_a_cluster_does_what_processes_do(cluster: Any) -> None:
     assert found["fast"]["error"] == expected["fast"]["error"]
     for name in ("a.csv", "b.csv"):
         assert Path("out", name).read_bytes() == Path("other", name).read_bytes()
-    assert {value["outcome"] for value in on(cluster, "jobs", "-o", "out")[1].values()} == {
-        "unchanged",
-        "failed",
-    }
-    assert {value["outcome"] for value in run("jobs", "-o", "out")[1].values()} == {"unchanged", "failed"}
+
+    def outcomes(of: tuple[int, dict[str, dict[str, Any]], str]) -> set[str]:
+        return {value["outcome"] for value in of[1].values()}
+
+    assert outcomes(on(capfd, cluster, "jobs", "-o", "out")) == {"unchanged", "failed"}
+    assert outcomes(run(capfd, "jobs", "-o", "out", "-j", "1")) == {"unchanged", "failed"}
     Path("jobs/arm.yaml").write_text("joints: [{velocity: 3}]\n")
-    assert {value["outcome"] for value in on(cluster, "jobs", "-o", "out")[1].values()} == {
-        "written",
-        "failed",
-    }
+    assert outcomes(on(capfd, cluster, "jobs", "-o", "out")) == {"written", "failed"}
 
 
 @pytest.mark.usefixtures("folder")
@@ -104,26 +107,35 @@ def test_a_sweep_is_the_same_table(cluster: Any, capfd: pytest.CaptureFixture[st
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_killed_worker_costs_its_own_job(cluster: Any) -> None:
+def test_a_killed_worker_costs_its_own_job(
+    cluster: Any, capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arrived: list[str] = []
+
+    def noted(future: Any, task: Task) -> JobOutcome:
+        arrived.append(Path(task.job.job).stem)
+        return outcome_of(future, task)
+
+    outcome_of = on_workers._outcome
+    monkeypatch.setattr(on_workers, "_outcome", noted)
     Path("jobs/fast.yaml").write_text(
         JOB.replace("rate: 10", "rate: 1e6").replace("duration: 1}", "duration: 1000}")
     )
-    killer = Thread(target=kill_when_under_way, args=(cluster,))
+    killer = Thread(target=kill_when_under_way, args=(cluster, arrived))
     killer.start()
-    code, found, _ = on(cluster, "jobs", "-o", "out")
+    code, found, _ = on(capfd, cluster, "jobs", "-o", "out")
     killer.join()
     assert (code, found["fast"]["outcome"], found["fast"]["exit"]) == (70, "crashed", 70)
     assert "KilledWorker" in found["fast"]["error"]
     assert set(found) == {"a", "b", "fast"}
 
 
-def kill_when_under_way(cluster: Any) -> None:
-    """Kill the worker once it does nothing but write the rows of the job that does not end."""
+def kill_when_under_way(cluster: Any, arrived: list[str]) -> None:
+    """Kill the worker once the outcomes of the others have left it, and it writes the job that does not end."""
     end = time.monotonic() + 150
-    while not (Path("out/b.csv").exists() and list(Path("out").glob(".trajcli-*.part"))):
+    while not ({*arrived} == {"a", "b"} and list(Path("out").glob(".trajcli-*.part"))):
         assert time.monotonic() < end
         time.sleep(0.05)
-    time.sleep(2)  # the outcomes of the others have left the worker
     os.kill(next(iter(cluster.workers.values())).pid, signal.SIGKILL)
 
 
@@ -169,10 +181,9 @@ def test_a_cluster_without_workers_is_one_error(
 
 
 @pytest.mark.usefixtures("folder")
-def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    Path("distributed.py").write_text("raise ImportError")
-    monkeypatch.setenv("PYTHONPATH", str(Path.cwd()), prepend=os.pathsep)
-    code, _, err = run("jobs", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:9")
+def test_without_dask_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)  # as where it is not installed
+    code, _, err = run(capfd, "jobs", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:9")
     assert code == 2
     assert "the engine dask needs the packages dask and distributed" in err
     assert "pip install 'trajcli[dask]'" in err
