@@ -34,6 +34,11 @@ output: {rate: 500, columns: [t, q, qd, qdd, move]}
 """
 
 
+@pytest.fixture(autouse=True)
+def _plans_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    share_plans(monkeypatch)
+
+
 def view(capfd: pytest.CaptureFixture[str], *words: str | Path) -> tuple[int, dict[str, Any]]:
     code, out, err = call(capfd, "check", *words, "--format", "json")
     assert out, err

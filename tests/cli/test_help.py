@@ -37,7 +37,7 @@ SHORTER = {
 }
 
 
-@pytest.mark.parametrize("name", few([name for name in NAMES if name != "payload"], 10) if QUICK else NAMES)
+@pytest.mark.parametrize("name", few([name for name in NAMES if name != "payload"], 7) if QUICK else NAMES)
 def test_each_command_has_an_example_that_runs(
     name: str, capfd: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -219,7 +219,7 @@ def test_the_earliest_time_of_a_log_is_one_that_is_taken(start: str, job: Path, 
 
 
 def test_the_highest_rate_is_one_that_is_taken(job: Path, capfd: Capture) -> None:
-    options = ("plan", job, "--no-output", "--set", "output.start_time=1e9")
+    options = ("plan", job, "--no-output", "--set", "output.start_time=1e12")  # seconds of few decimals
     said = call(capfd, *options, "--rate", "1e7").err.split()
     assert call(capfd, *options, "--rate", said[said.index("most") + 1]).code == 0
 

@@ -15,6 +15,8 @@ from trajcli.catalogue.entries import catalogue_names, robot_file
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.queries import catalogue_list
+from trajcli.queries.arm import open_sheet
+from trajcli.queries.robot_card import robot_row
 
 
 @pytest.fixture(scope="module")
@@ -39,15 +41,16 @@ def test_the_index_says_what_the_files_say(told_of_files):
         assert {**told, "reach": None} == {**of_table(row), "reach": None}
 
 
-def test_an_index_of_other_files_is_not_read(monkeypatch, tmp_path, told_of_files):
+def test_an_index_of_other_files_is_not_read(monkeypatch, tmp_path):
+    told = [robot_row(name, open_sheet(name)) for name in ("ur5e", "planar2r")]
     other = tmp_path / "index.json"
     monkeypatch.setattr(catalogue_list, "INDEX", other)
-    monkeypatch.setattr(catalogue_list, "rows_of_files", lambda: told_of_files)
+    monkeypatch.setattr(catalogue_list, "rows_of_files", lambda: told)
     for text in ("{", "[]", '{"files": 1, "robots": []}'):
         other.write_text(text)
-        assert catalogue_list.catalogue_rows() == [of_table(row) for row in told_of_files]
+        assert catalogue_list.catalogue_rows() == [of_table(row) for row in told]
     other.unlink()
-    assert catalogue_list.catalogue_rows() == [of_table(row) for row in told_of_files]
+    assert catalogue_list.catalogue_rows() == [of_table(row) for row in told]
 
 
 @pytest.fixture

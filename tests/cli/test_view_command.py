@@ -219,8 +219,15 @@ def test_an_arm_is_for_files(folder: Path, capfd: pytest.CaptureFixture[str]) ->
     assert not (folder / "view.html").exists()
 
 
-@pytest.mark.parametrize("names", [("job.yaml", "rows.csv"), ("rows.csv", "job.yaml")])
-@pytest.mark.parametrize(("rate", "limit", "code"), [(95, 96, 0), (95, 90, 1), (85, 86, 0), (85, 84, 1)])
+@pytest.mark.parametrize(
+    ("rate", "limit", "code", "names"),
+    [
+        (95, 96, 0, ("job.yaml", "rows.csv")),
+        (95, 90, 1, ("rows.csv", "job.yaml")),
+        (85, 86, 0, ("rows.csv", "job.yaml")),
+        (85, 84, 1, ("job.yaml", "rows.csv")),
+    ],
+)
 def test_a_file_beside_its_job_is_judged_by_the_values_that_are_set(
     rate: float,
     limit: float,

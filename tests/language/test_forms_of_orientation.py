@@ -43,7 +43,13 @@ def forms(turn: Rotation, angle: float) -> dict[str, object]:
     }
 
 
-CASES = [(unit, form) for unit in UNITS for form in forms(TURN, 1)]
+CASES = [
+    (unit, form)
+    for number, form in enumerate(forms(TURN, 1))
+    for unit in UNITS
+    if "euler" not in form
+    or list(UNITS)[number // 2 % 2] == unit  # each sequence in one, in one frame of each two
+]
 
 
 @pytest.mark.filterwarnings("ignore:Gimbal lock")
@@ -58,8 +64,9 @@ def test_every_form_is_the_rotation_of_scipy(unit: str, form: str) -> None:
     head = f"version: 1\nrobot: ur5e\nunits: {{angle: {angle}, length: {length}}}\n"
     text = head + "".join(f"{key}: {json.dumps(item)}\n" for key, item in plain.items())
     job = job_from_text(text + MOVES)
-    again = job_from_text(dump_job(job).replace("angle: deg, length: mm", "angle: rad, length: m"))
-    for each in (job, again, job_from_text(dump_job(job))):
+    resolved = dump_job(job)
+    again = job_from_text(resolved.replace("angle: deg, length: mm", "angle: rad, length: m"))
+    for each in (job, again, *([job_from_text(resolved)] if unit == "deg" else [])):
         for read in (each.robot.tool, each.robot.base, each.job.points["p"].full_pose()):
             np.testing.assert_allclose(read, expected, rtol=1e-15, atol=3e-15)
     assert np.array_equal(job.job.points["p"].full_pose(), again.job.points["p"].full_pose())

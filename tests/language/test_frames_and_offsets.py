@@ -80,30 +80,30 @@ ALONG = [(outer, along) for along in (*AXES, "tool") for outer in AXES]
 
 @pytest.mark.parametrize(("outer", "along"), few(ALONG, 10))
 def test_an_offset_along_any_axes_from_a_point_in_any_frame(outer: str, along: str) -> None:
-    """In a chain of two, also where an offset does not turn; the point keeps its branch."""
-    for text, turn in zip(ORIENTATIONS, TURNS, strict=True):
-        start = AXES[outer] @ pose(turn, 40, 50, 60)
-        for offset, written in (
-            (OFFSET, OFFSET_TEXT),
-            (pose(Rotation.identity(), 0, 7, 0), "offset: {xyz: [0, 7, 0]}"),
-        ):
-            points = f"  a: {{in: {outer}, xyz: [40, 50, 60], {text}, configuration: {{elbow: up}}}}\n"
-            points += (
-                f"  b: {{from: a, {written}, frame: {along}}}\n  c: {{from: b, {written}, frame: {along}}}\n"
-            )
-            expected = start
-            job = read(points)
-            for name in ("a", "b", "c"):
-                for each in (job, again(job)):
-                    point = each.job.points[name]
-                    np.testing.assert_allclose(point.full_pose(), expected, atol=2e-14)
-                    assert point.configuration is not None
-                    assert point.configuration.elbow == "up"
-                axes = AXES.get(along, expected)[:3, :3]
-                moved = np.eye(4)
-                moved[:3, 3] = expected[:3, 3] + axes @ offset[:3, 3]
-                moved[:3, :3] = axes @ offset[:3, :3] @ axes.T @ expected[:3, :3]
-                expected = moved
+    """In chains of two, also where an offset does not turn; the point keeps its branch."""
+    offsets = ((OFFSET, OFFSET_TEXT), (pose(Rotation.identity(), 0, 7, 0), "offset: {xyz: [0, 7, 0]}"))
+    points, expected = "", {}
+    for number, (text, turn) in enumerate(zip(ORIENTATIONS, TURNS, strict=True)):
+        for kind, (offset, written) in enumerate(offsets):
+            a, b, c = (f"{letter}{number}{kind}" for letter in "abc")
+            points += f"  {a}: {{in: {outer}, xyz: [40, 50, 60], {text}, configuration: {{elbow: up}}}}\n"
+            points += f"  {b}: {{from: {a}, {written}, frame: {along}}}\n"
+            points += f"  {c}: {{from: {b}, {written}, frame: {along}}}\n"
+            expected[a] = AXES[outer] @ pose(turn, 40, 50, 60)
+            for before, name in ((a, b), (b, c)):
+                start = expected[before]
+                axes = AXES.get(along, start)[:3, :3]
+                moved = expected[name] = np.eye(4)
+                moved[:3, 3] = start[:3, 3] + axes @ offset[:3, 3]
+                moved[:3, :3] = axes @ offset[:3, :3] @ axes.T @ start[:3, :3]
+    job = read(points)
+    assert len(expected) == 18
+    for each in (job, again(job)):
+        for name, where in expected.items():
+            point = each.job.points[name]
+            np.testing.assert_allclose(point.full_pose(), where, atol=2e-14)
+            assert point.configuration is not None
+            assert point.configuration.elbow == "up"
 
 
 @pytest.mark.parametrize("order", ["abcd", "dcba", "cdab", "bdac"])
@@ -186,8 +186,9 @@ def of_move(target: str) -> Target:
     moves = MOVES.replace("{planner: hold, duration: 1}", f"{{planner: line, to: {target}}}")
     text = "  j: {joints: [0, -90, 90, 0, 90, 0]}\n  h: {from: here, offset: {xyz: [0, 0, 1]}}\n  k: {joints_by: 3}\n"
     job = read(text, moves)
-    (move,), (same,) = job.job.moves, again(job).job.moves
-    assert (job.waits, again(job).waits) == (True, True)
+    resolved = again(job)
+    (move,), (same,) = job.job.moves, resolved.job.moves
+    assert (job.waits, resolved.waits) == (True, True)
     assert move.to == same.to  # type: ignore[attr-defined]
     return move.to  # type: ignore[attr-defined, no-any-return]
 
