@@ -7,8 +7,11 @@ each time. How many there are is said by `tiers`.
 import gc
 import os
 import signal
+import sys
 from contextlib import suppress
 from functools import cache
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: threads of small matrices only wait
@@ -47,6 +50,23 @@ def pytest_configure(config: pytest.Config) -> None:
     starts_workers = bool(getattr(config.option, "numprocesses", None)) and not hasattr(config, "workerinput")
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN and not starts_workers:
         signal.signal(signal.SIGHUP, lambda *_: None)
+
+
+def pytest_collection(session: pytest.Session) -> None:
+    """Let each worker begin to import the tests in another place, so that each is compiled by one of them.
+
+    The first run of a clone compiles them all; in the same order each worker would do so, for all of them at the same time.
+    """
+    worker = getattr(session.config, "workerinput", None)
+    if worker is None or session.config.args != session.config.getini("testpaths"):
+        return
+    tests = sorted(Path(__file__).parent.rglob("test_*.py"))
+    first = len(tests) * int(worker["workerid"].removeprefix("gw")) // worker["workercount"]
+    for test in tests[first:] + tests[:first]:
+        if str(test.parent) not in sys.path:
+            sys.path.insert(0, str(test.parent))
+        with suppress(Exception, pytest.skip.Exception):  # said where the test is collected
+            import_module(test.stem)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
