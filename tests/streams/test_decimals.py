@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import QUICK
 
 from trajcli.streams import decimals
 from trajcli.streams.decimals import encode_fixed
@@ -135,8 +136,9 @@ def digits_of(cell):
 
 def test_full_digits_are_those_of_repr():
     generator = np.random.default_rng(5)
-    drawn = generator.integers(0, 2**64, 40_000, dtype=np.uint64).view(np.float64)
-    sized = generator.normal(size=40_000) * 10.0 ** generator.integers(-9, 19, 40_000)
+    count = 10_000 if QUICK else 40_000
+    drawn = generator.integers(0, 2**64, count, dtype=np.uint64).view(np.float64)
+    sized = generator.normal(size=count) * 10.0 ** generator.integers(-9, 19, count)
     edges = [
         0.0,
         -0.0,

@@ -71,7 +71,7 @@ def test_a_thousand_reachable_poses_of_a_general_arm(name):
 def test_any_chain_of_six_joints_is_solved(convention):
     rng = np.random.default_rng(10)
     solved = 0
-    while solved < 3:
+    while solved < 2:
         robot = random_arm(rng, 6, convention)
         joints = rng.uniform(-1, 1, (4, 6))
         if dexterity(robot, joints).condition.max() > 1e3:  # too many slides: every pose has a self-motion
@@ -87,7 +87,7 @@ def test_an_arm_of_five_joints_reaches_its_own_poses_as_they_are_written(decimal
     """Rounded to some decimals they are out of its reach, by no more than the tolerance."""
     rng = np.random.default_rng(3)
     robot = random_arm(rng, 5, "standard")
-    joints = rng.uniform(-1.5, 1.5, (3, 5))
+    joints = rng.uniform(-1.5, 1.5, (2, 5))
     poses = np.round(forward(robot, joints), decimals)
     found = solve(robot, poses, joints, tolerance)
     assert found.valid.any(axis=1).all()

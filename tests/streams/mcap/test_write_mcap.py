@@ -264,7 +264,7 @@ def test_every_message_stands_in_order_of_time_and_in_its_index(compression: str
     from mcap.records import Channel, Chunk, Message, MessageIndex
     from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
 
-    plan = plan_of("ur5e_pick", "output.rate=2000")
+    plan = plan_of("ur5e_pick", "output.rate=1400")
     path = write_log(plan, tmp_path / "a.mcap", compression=compression)
     last, chunks, indexed = 0, 0, Counter()
     with path.open("rb") as stream:
