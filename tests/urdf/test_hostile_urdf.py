@@ -80,6 +80,7 @@ REFUSED = [
     ('<child link="right_finger"/>', '<child link="upper"/>', 23, "is the child of 'j1' and of 'grip_mirror'"),
     ('<robot name="arm">', '<robot name="arm"><xacro:include filename="a"/>', 2, "<xacro:include> is xacro"),
     ('xyz="0.4 0 0"', 'xyz="${l} 0 0"', 13, "is xacro"),
+    ('xyz="0.4 0 0"', 'xyz="$(arg l) 0 0"', 13, "is xacro"),
     ('<robot name="arm">', '<sdf name="arm">', 28, "no XML: mismatched tag"),
     ("</robot>", "", 29, "no XML: no element found"),
     ("<axis xyz=\"0 0 2\"/>", "<axis xyz=\"0 0 2\" xyz=\"0 0 1\"/>", 7, "duplicate attribute"),
@@ -165,6 +166,7 @@ def test_hints_say_what_to_do() -> None:
     ("old", "new"),
     [
         ("package://arm/base.stl", "package://no such/../../etc/passwd"),
+        ("package://arm/base.stl", "$(find arm)/base.stl"),
         ("<visual>", '<visual><origin rpy="a b c"/>'),
         ('<mimic joint="grip"/>', '<mimic joint="grip"/><origin xyz="1 2"/>'.replace('xyz="1 2"', 'xyz="1 2 3"')),
         ('<robot name="arm">', '<robot name="arm" xmlns:a="b"><gazebo:plugin rpy="x"/>'),

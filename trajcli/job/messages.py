@@ -113,6 +113,7 @@ _NOT_HERE = {
 _TIMES = ("times", "knots", "time_stamps", "timestamps")
 """Words for the times of points."""
 _PLANNERS_ELSEWHERE = {
+    "repeat": "a round is an entry of its own: `{repeat: 3, moves: [...]}`",
     "stop": "every move ends at rest unless it has a `zone`, or its target a velocity; a moving arm is "
     "stopped by `{planner: jerk_limited, to: {velocity: 0}}`",
 }

@@ -292,7 +292,7 @@ class _Builder:
             message = f"<{name}> is xacro, a language of macros that must be expanded first"
             raise InputError(Problem(message, hint, self._here(name)))
         for key, text in attributes.items():
-            if "${" in text:
+            if "${" in text or ("$(" in text and key != "filename"):
                 message = (
                     f'{key}="{text[:_QUOTED]}" is xacro, a language of macros that must be expanded first'
                 )

@@ -56,6 +56,7 @@ def test_which_columns_are_taken(names: str, columns: str | None, wanted: dict[s
         ("t,time,q1", None, "2 columns are times: t, time", "--columns t=t or --columns t=time"),
         ("q1,q2", None, "no column is the time", "name it: --columns t=NAME"),
         ("t,A1,A2", None, "no columns are positions of joints", "--columns q=A takes A1, A2 as positions"),
+        ("t,x,y,z", None, "no columns are positions of joints", "`trajcli check FILE --job JOB`"),
         ("t,q1", "q=p", "--columns: there is no column 'p'", "its columns are"),
         ("t,q1,q2", "qdx=q1", "--columns: unknown quantity 'qdx'", "did you mean"),
         ("t,q1,q2", "q=q,q=q", "--columns: q is mapped twice", "map it once"),

@@ -251,6 +251,8 @@ class _Assignment:
             for (_, stem), group in self._groups(quantity).items():
                 if len(stem.strip("_ .[(")) == 1:
                     hint = f"--columns q={stem} takes {self._listed(group)} as positions"
+        if {"x", "y", "z"} <= {*self._file.names}:
+            hint += "; poses of the tool are judged by `trajcli check FILE --job JOB`"
         raise self._file.wrong("no columns are positions of joints, such as q1, q2", hint)
 
     def _refuse(self, message: str, groups: Mapping[tuple[str, str], ColumnGroup]) -> NoReturn:
