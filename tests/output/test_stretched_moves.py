@@ -83,11 +83,9 @@ def test_positions_alone_are_joined_by_lines_that_are_never_faster() -> None:
 
 def test_rounding_of_far_positions_is_no_jerk() -> None:
     """A quintic's jerk is 60 / T^3 at its ends; at 1000 rad, 4000 rows a second, the last bits of rows add to it."""
-    moves = [
-        {"planner": "quintic", "to": {"joints": [to, to + 1.1]}, "duration": 0.2} for to in (1001.3, 1000.3)
-    ]
-    ((over, share),) = said_of(
-        moves, {"jerk": [60 / 0.2**3, 61 * 2.1 / 0.2**3]}, ("q", "qd", "qdd"), 4000.0, (1.0,), start=1000.3
-    )
+    start, far, jerk = 1000.0, [1001.0, 1001.1], 60 / 0.2**3
+    moves = [{"planner": "quintic", "to": {"joints": to}, "duration": 0.2} for to in (far, [start, start])]
+    limits = {"jerk": [jerk, 1.1 * jerk]}
+    ((over, share),) = said_of(moves, limits, ("q", "qd", "qdd"), 4000.0, (1.0,), start)
     assert 1 + 3e-6 < share < 1 + 1e-3
     assert not over
