@@ -76,6 +76,21 @@ def test_moves_are_said_to_be_over_where_scipys_curve_is(
     assert [over for over, _ in said] != [False] * 4
 
 
+def test_a_velocity_alone_that_swings_out_counts() -> None:
+    """Ramps of little more than an interval; the acceleration is far below its limit."""
+    moves = [{"planner": "jerk_limited", "to": {"joints": joints}} for joints in ([4, -1], [0, 0.3])]
+    limits = {"velocity": 1.5, "acceleration": 1000, "jerk": 1000}
+    said = said_of(moves, limits, ("q", "qd"), 17.0, (1.0, 1.05))
+    assert [over for over, _ in said] == [share > 1 + SURE for _, share in said] == [True, False]
+
+
+def test_the_row_between_two_moves_states_how_the_second_begins() -> None:
+    """Cubics without a break inside: what swings out is the last interval, by the step of acceleration behind it."""
+    moves = [{"planner": "cubic", "to": {"joints": joints}, "duration": 1.0} for joints in THERE_AND_BACK]
+    said = said_of(moves, {"acceleration": 6.12}, ("q", "qd", "qdd"), 50.0, (1.0, 1.1))
+    assert [over for over, _ in said] == [share > 1 + SURE for _, share in said] == [True, False]
+
+
 def test_positions_alone_are_joined_by_lines_that_are_never_faster() -> None:
     moves = [{"planner": "jerk_limited", "to": {"joints": joints}} for joints in THERE_AND_BACK]
     assert not any(over for over, _ in said_of(moves, ALIKE, ("q",), 23.0, (1.0, 1.05)))
