@@ -29,10 +29,11 @@ settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.register_profile("new", deadline=None)
 settings.load_profile("new" if TIER == "soak" else "fixed")
 if TIER != "soak":  # nor does an example depend on which files of trajcli the tests before it have loaded
-    with suppress(ImportError):
+    with suppress(ImportError, AttributeError):  # no public setting says so
         from hypothesis.internal.conjecture import providers
 
-        providers._get_local_constants = lambda: providers._local_constants
+        none_of_them = providers._local_constants
+        providers._get_local_constants = lambda: none_of_them
 typer.main.get_command = cache(typer.main.get_command)  # it makes all commands: longer than what most do
 ASKED = "_hypothesis_internal_use_settings"
 
