@@ -40,9 +40,9 @@ def job_text(robot: Any, start: Fields, *moves: Fields, **rest: Any) -> str:
     return json.dumps(job)
 
 
-def planned(robot: Any, start: Fields, *moves: Fields, **rest: Any) -> Plan:
+def planned(robot: Any, start: Fields, *moves: Fields, advise: bool = True, **rest: Any) -> Plan:
     """Return the plan of a job, read from its text; its verdict may be any."""
-    return plan_job(job_from_text(job_text(robot, start, *moves, **rest)))
+    return plan_job(job_from_text(job_text(robot, start, *moves, **rest)), advise=advise)
 
 
 def plan(robot: Any, start: Fields, *moves: Fields, **rest: Any) -> Plan:

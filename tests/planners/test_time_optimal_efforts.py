@@ -6,6 +6,7 @@ import logging
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -71,7 +72,7 @@ def solved(path: PiecewisePolynomial, robot: Robot):
     )
 
 
-def shares(curve: PiecewisePolynomial, robot: Robot, count: int = 50_001) -> np.ndarray:
+def shares(curve: PiecewisePolynomial, robot: Robot, count: int = 10_001) -> np.ndarray:
     """Return the efforts by dense rows, as shares of the limits; where an arm comes to rest, just before."""
     t = np.linspace(curve.start, curve.end, count)[1:-1]
     efforts = InverseDynamics(robot).effort(*(curve.evaluate(t, order) for order in range(3)))
@@ -279,8 +280,13 @@ def job(**fields):
     }
 
 
+@cache
+def planned_job():
+    return plan(job())
+
+
 def test_jobs_need_no_acceleration_limits_then():
-    planned = plan(job())
+    planned = planned_job()
     assert planned.verdict.passed
     (efforts,) = planned.verdict.efforts
     assert 0.999 <= efforts.share() <= 1 + 1e-6
@@ -308,7 +314,7 @@ def test_ends_in_motion():
 
 
 def test_a_payload_slows_it_down():
-    light, heavy = plan(job()), job()
+    light, heavy = planned_job(), job()
     heavy["moves"].insert(0, {"attach": {"mass": 5}})
     loaded = plan(heavy)
     assert loaded.verdict.passed

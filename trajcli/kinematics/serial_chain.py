@@ -22,7 +22,6 @@ from trajcli.kinematics.columns import (
     VectorEntries,
     advance,
     combine,
-    dot,
     minus,
     product,
     scaled,
@@ -154,12 +153,10 @@ class MovingFrame:
     def attach(self, tool: Array) -> None:
         """Move to the frame whose pose in this one is `tool`."""
         x, y, z = self.x, self.y, self.z
-        rows = tuple(zip(x, y, z, strict=True))
         for distance, axis in zip(tool[:3, 3].tolist(), (x, y, z), strict=True):
             self.p = advance(self.p, distance, axis)
         self._x, self._y, self.z = (
-            (dot(rows[0], column), dot(rows[1], column), dot(rows[2], column))
-            for column in map(tuple, tool[:3, :3].T.tolist())
+            advance(advance(scaled(a, x), b, y), c, z) for a, b, c in tool[:3, :3].T.tolist()
         )
         self._angle, self._turned, self._x_now = 0.0, None, None
 

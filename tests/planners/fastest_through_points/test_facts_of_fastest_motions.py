@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -22,6 +23,7 @@ from trajcli.planners.fastest_through_points.assembly import (
 )
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.search import search
+from trajcli.planners.fastest_through_points.segment_motion import PointMotion
 
 NAMES = ["one", "two"]
 POINTS = np.array([[0.0, 0.1], [0.6, -0.3], [0.2, 0.4], [0.9, 0.5]])
@@ -158,7 +160,7 @@ def test_walls_on_either_side_are_kept(sign: float) -> None:
     points = sign * np.array([[0, 0], [1, 0.3], [0.2, 0.9], [0.6, 0.1]])
     low, high = points.min(axis=0) - 0.01, points.max(axis=0) + 0.01
     free = problem(points, joints=2)
-    (peak,) = peaks(fastest_motion(free, NAMES, 2).motion.curve, (0,))
+    (peak,) = peaks(fastest_motion(free, NAMES, 1).motion.curve, (0,))
     assert (peak.high > high).any() or (peak.low < low).any()
     made = replace(free, position=np.stack([low, high], axis=1))
     found = fastest_motion(made, NAMES[: made.joints], 2)
@@ -166,8 +168,7 @@ def test_walls_on_either_side_are_kept(sign: float) -> None:
     assert found.motion.duration < found.stopping
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("joint", [0, 1])
+@pytest.mark.parametrize(("joint", "sign"), [(0, -1.0), (1, 1.0)])
 def test_the_joint_that_passes_a_limit_in_vain_is_named_with_what_it_reaches(joint: int, sign: float) -> None:
     """Through a point beside its limit with a velocity towards it: it goes on by what braking takes."""
     points = np.array([[0.0, 0.0], [0.1, 0.1], [0.2, 0.2]])
@@ -205,13 +206,19 @@ def test_what_is_given_beyond_a_limit_is_no_matter_of_position_limits() -> None:
         fastest_motion(replace(made, position=walls), NAMES, 2)
 
 
+@cache
+def free_motion(sign: float) -> tuple[WaypointProblem, PointMotion, np.ndarray]:
+    """Return a problem, its motion, and dense rows of it."""
+    free = problem(sign * POINTS, joints=2)
+    motion = fastest_motion(free, NAMES, 1).motion
+    return free, motion, motion.curve.evaluate(np.linspace(0.0, motion.duration, 200001))
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("joint", [0, 1])
 def test_a_motion_keeps_positions_up_to_rounding_on_each_side(joint: int, sign: float) -> None:
-    free = problem(sign * POINTS, joints=2)
-    motion = fastest_motion(free, NAMES, 1).motion
-    times = np.linspace(0.0, motion.duration, 200001)
-    reached = motion.curve.evaluate(times)[:, joint]
+    free, motion, rows = free_motion(sign)
+    reached = rows[:, joint]
     for side, edge, out in ((0, reached.min(), -1.0), (1, reached.max(), 1.0)):
         for by, kept in ((1e-3, True), (5e-10, True), (-5e-10, True), (-1e-6, False), (-1e-3, False)):
             walls = np.array([[-np.inf, np.inf]] * 2)

@@ -90,7 +90,8 @@ def test_where_speeds_step_none_is_wanted() -> None:
 
 @pytest.mark.parametrize(("jerk", "continuity"), [(None, 1), (2000.0, 2)])
 def test_a_fastest_law_within_jerk_joins_accelerations(jerk: float | None, continuity: int) -> None:
-    move = only(line(UP, law={"shape": "time_optimal"}), limits={**LIMITS, "jerk": jerk})
+    short = {"xyz": rows(HERE + np.array([0.0, 0.0, 0.01]))}
+    move = only(line(short, law={"shape": "time_optimal"}), limits={**LIMITS, "jerk": jerk})
     assert move.planned.continuity == continuity
     assert move.planned.events
 

@@ -17,6 +17,7 @@ from trajcli.job.read import job_from_text
 from trajcli.planning.plan import plan_job
 
 LAW = "{speed: 1, acceleration: 1}"
+FASTEST = "{shape: time_optimal}"
 
 
 def refusal(
@@ -39,9 +40,15 @@ moves: [{{planner: line, to: {{xyz: [{x!r}, 0, {z!r}]}}, law: {law}}}]
     return caught.value.problems[0]
 
 
-@pytest.mark.parametrize("law", [LAW, "{shape: time_optimal}"])
-@pytest.mark.parametrize(("length", "name", "unit"), [(2.0, "lift", "m"), (0.5, "turn", "rad")])
-@pytest.mark.parametrize("turn", [60.0, -60.0])
+@pytest.mark.parametrize(
+    ("turn", "length", "name", "unit", "law"),
+    [
+        (60.0, 2.0, "lift", "m", LAW),
+        (60.0, 0.5, "turn", "rad", FASTEST),
+        (-60.0, 2.0, "lift", "m", FASTEST),
+        (-60.0, 0.5, "turn", "rad", LAW),
+    ],
+)
 def test_the_joint_that_goes_fastest_into_a_singularity_is_named(
     turn: float, length: float, name: str, unit: str, law: str
 ) -> None:
@@ -70,18 +77,17 @@ def test_a_place_beyond_the_reach_is_missed_by_what_lies_beyond() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fields", "joint", "value", "limit"),
+    ("fields", "joint", "value", "limit", "law"),
     [
-        ({"lift": ", position: [-3, 1]"}, "lift", 1.1075510, 1.0),
-        ({"turn": -60.0, "lift": ", position: [-1, 3]"}, "lift", -1.1075510, -1.0),
-        ({"arm": ", position: [20, 90]"}, "turn", 18.194872, 20),
-        ({"turn": -60.0, "arm": ", position: [-90, -20]"}, "turn", -18.194872, -20),
-        ({"lift": ", position: [-3, 1.1]", "arm": ", position: [25, 90]"}, "turn", 18.194872, 25),
-        ({"lift": ", position: [-3, 0.9]", "arm": ", position: [18.1, 90]"}, "lift", 1.1075510, 0.9),
-        ({"lift": ", position: [-3, 0.9]", "arm": ", position: [19, 90]"}, "lift", 1.1075510, 0.9),
+        ({"lift": ", position: [-3, 1]"}, "lift", 1.1075510, 1.0, LAW),
+        ({"turn": -60.0, "lift": ", position: [-1, 3]"}, "lift", -1.1075510, -1.0, FASTEST),
+        ({"arm": ", position: [20, 90]"}, "turn", 18.194872, 20, FASTEST),
+        ({"turn": -60.0, "arm": ", position: [-90, -20]"}, "turn", -18.194872, -20, LAW),
+        ({"lift": ", position: [-3, 1.1]", "arm": ", position: [25, 90]"}, "turn", 18.194872, 25, FASTEST),
+        ({"lift": ", position: [-3, 0.9]", "arm": ", position: [18.1, 90]"}, "lift", 1.1075510, 0.9, LAW),
+        ({"lift": ", position: [-3, 0.9]", "arm": ", position: [19, 90]"}, "lift", 1.1075510, 0.9, FASTEST),
     ],
 )
-@pytest.mark.parametrize("law", [LAW, "{shape: time_optimal}"])
 def test_the_joint_that_is_furthest_beyond_its_range_is_named(
     fields: dict[str, Any], joint: str, value: float, limit: float, law: str
 ) -> None:
@@ -98,7 +104,7 @@ def test_the_joint_that_is_furthest_beyond_its_range_is_named(
     assert numbers == [pytest.approx(value, rel=1e-5), pytest.approx(0.9), pytest.approx(limit)]
 
 
-@pytest.mark.parametrize("law", [LAW, "{shape: time_optimal}"])
+@pytest.mark.parametrize("law", [LAW, FASTEST])
 def test_a_range_that_is_left_on_the_way_is_left_where_the_joint_is_farthest(law: str) -> None:
     """Through the middle: at x = 0 the arm stands upright, and the lift is lowest."""
     problem = refusal(-0.8, lift=", position: [-0.2, 3]", law=law)

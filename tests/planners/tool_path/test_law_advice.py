@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -25,8 +26,9 @@ def target(length):
     return [0.4, 0.1 + length, 0.3]
 
 
-@pytest.mark.parametrize("length", few([0.1, 0.05, 0.1234567, 1 / 30, 0.2 / 7], 2))
-@pytest.mark.parametrize("duration", [2.0, 0.75, 1.1])
+@pytest.mark.parametrize(
+    ("length", "duration"), few(list(product([0.1, 0.05, 0.1234567, 1 / 30, 0.2 / 7], [2.0, 0.75, 1.1])), 4)
+)
 def test_the_least_acceleration_of_a_trapezoid_is_a_triangle_that_passes(length, duration):
     """The area of the triangle is the length: a = 4 L / T^2; there is no cruise that rounding makes."""
     law = {"shape": "trapezoid", "duration": duration}
@@ -52,8 +54,9 @@ def test_rounding_of_the_length_makes_no_cruise(rounding):
     np.testing.assert_allclose(made.moves[0].planned.tool.law.breaks, [0, 1, 2], atol=1e-12)
 
 
-@pytest.mark.parametrize("length", [0.1, 1 / 30, 0.2 / 7])
-@pytest.mark.parametrize("duration", [0.75, 1.1, 2 / 3])
+@pytest.mark.parametrize(
+    ("length", "duration"), few(list(product([0.1, 1 / 30, 0.2 / 7], [0.75, 1.1, 2 / 3])), 5)
+)
 def test_the_speeds_that_a_trapezoid_may_have_pass(length, duration):
     law = {"shape": "trapezoid", "duration": duration}
     text, _ = said({**law, "speed": 0.9 * length / duration}, to=target(length))
@@ -63,8 +66,9 @@ def test_the_speeds_that_a_trapezoid_may_have_pass(length, duration):
     plan("ur5e", START, line({"xyz": target(length)}, law={**law, "speed": high}), limits=FREE)
 
 
-@pytest.mark.parametrize("shape", ["cubic", "quintic", "cycloidal"])
-@pytest.mark.parametrize("length", [0.1, 1 / 30, 0.2 / 7])
+@pytest.mark.parametrize(
+    ("shape", "length"), few(list(product(["cubic", "quintic", "cycloidal"], [0.1, 1 / 30, 0.2 / 7])), 5)
+)
 def test_the_duration_that_a_polynomial_needs_passes(shape, length):
     law = {"shape": shape, "speed": 0.03}
     text, advice = said({**law, "duration": 0.1}, to=target(length))

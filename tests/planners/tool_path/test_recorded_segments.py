@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import yaml
@@ -31,10 +33,8 @@ def rows(places=AROUND, tilts=TILTS, scale=1.0):
     )
 
 
-def job(folder, text, segments, move=None, **rest):
-    """Return a job in a folder beside the file of poses."""
-    (folder / "poses.csv").write_text(text)
-    content = {
+def content_of(segments, move=None, **rest):
+    return {
         "version": 1,
         "robot": "ur5e",
         "limits": {
@@ -45,6 +45,12 @@ def job(folder, text, segments, move=None, **rest):
         "moves": [{"planner": "path", "radius": 0.01, "segments": segments, **(move or {})}],
         **rest,
     }
+
+
+def job(folder, text, segments, move=None, **rest):
+    """Return a job in a folder beside the file of poses."""
+    (folder / "poses.csv").write_text(text)
+    content = content_of(segments, move, **rest)
     file = folder / "job.yaml"
     file.write_text(yaml.safe_dump(content))
     return load_job(file)
@@ -63,6 +69,14 @@ def written(places, tilts):
     ]
 
 
+@cache
+def as_lines():
+    """Return the plan of the lines to the poses of the file."""
+    made = plan_job(job_from_text(yaml.safe_dump(content_of(written(AROUND[1:], TILTS[1:])))))
+    assert made.verdict.passed
+    return made
+
+
 def same_motion(one, other, atol=1e-7):
     assert one.trajectory.duration == pytest.approx(other.trajectory.duration, rel=1e-6)
     times = np.linspace(0.0, min(one.trajectory.duration, other.trajectory.duration), 40)
@@ -73,7 +87,7 @@ def same_motion(one, other, atol=1e-7):
 def test_a_file_is_the_lines_to_its_poses(tmp_path):
     """The first row is where the arm stands; the doubled pose counts once."""
     made = planned(tmp_path, HEADER + rows(), {"csv": "poses.csv"})
-    same_motion(made, planned(tmp_path, HEADER, written(AROUND[1:], TILTS[1:])))
+    same_motion(made, as_lines())
     assert [e.kind for e in made.moves[0].planned.events] == ["merged"]
     said = made.moves[0].planned.events[0].message
     assert said == "segment 2 counts for nothing: it ends where it begins"
@@ -87,7 +101,7 @@ def test_a_file_is_the_lines_to_its_poses(tmp_path):
 def test_lengths_may_be_in_mm_and_the_first_row_somewhere_else(tmp_path):
     header = HEADER.replace("x,y,z", "x_mm,y_mm,z_mm")
     made = planned(tmp_path, header + rows(AROUND[1:], TILTS[1:], 1000.0), {"csv": "poses.csv"})
-    same_motion(made, planned(tmp_path, HEADER, written(AROUND[1:], TILTS[1:])))
+    same_motion(made, as_lines())
 
 
 def test_without_orientation_it_is_kept(tmp_path):
@@ -115,7 +129,7 @@ def test_poses_in_a_frame_are_turned_and_moved_with_it(tmp_path):
             + "\n"
         )
     made = planned(tmp_path, text, {"csv": "poses.csv", "in": "table"}, frames=frames)
-    same_motion(made, planned(tmp_path, HEADER + rows(), {"csv": "poses.csv"}), 1e-6)
+    same_motion(made, as_lines(), 1e-6)
 
 
 def test_near_poses_are_left_out_and_told(tmp_path):
@@ -125,7 +139,7 @@ def test_near_poses_are_left_out_and_told(tmp_path):
     kinds = [(e.kind, e.message) for e in made.moves[0].planned.events]
     assert kinds[0][0] == "merged"
     assert kinds[0][1].startswith("left out 2 of 6 poses of ")
-    same_motion(made, planned(tmp_path, HEADER, written(AROUND[1:], TILTS[1:])))
+    same_motion(made, as_lines())
 
 
 @pytest.mark.full
@@ -146,8 +160,7 @@ def test_a_path_of_poses_is_flown_by(tmp_path):
 
 def test_a_job_written_out_is_the_same_plan(tmp_path):
     loaded = job(tmp_path, HEADER + rows(), {"csv": "poses.csv", "merge": 0.001})
-    again = plan_job(job_from_text(dump_job(loaded)))
-    same_motion(plan_job(loaded), again)
+    same_motion(plan_job(job_from_text(dump_job(loaded))), as_lines())
 
 
 @pytest.mark.parametrize(

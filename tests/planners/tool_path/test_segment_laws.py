@@ -116,7 +116,7 @@ def test_half_a_corner_belongs_to_each_of_its_segments():
 
 
 def test_a_motion_that_is_too_fast_on_one_segment_alone_is_found():
-    made = bent()
+    made = straight((0.1, 0.4, 0.25, 0.05), (0.1, 0.2, 0.2, 0.1))
     span, move = made.trajectory.spans[0], made.moves[0]
     tool = SampledTool(made.trajectory, span, move.robot, move.planned.tool)
     assert not check_tool(tool)

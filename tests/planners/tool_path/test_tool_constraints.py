@@ -47,7 +47,9 @@ def refused_in_mm(move):
 
 def test_a_speed_and_a_duration_are_kept_although_the_rotation_is_too_fast_then():
     """At 0.2 m/s the tool turns by 0.8 rad / LENGTH x 0.2 m/s: that breaks its limit, and is not made slower."""
-    made = planned("ur5e", START, line(law={"duration": 2, "speed": 0.2}), limits=tcp(angular_speed=0.5))
+    made = planned(
+        "ur5e", START, line(law={"duration": 2, "speed": 0.2}), limits=tcp(angular_speed=0.5), advise=False
+    )
     assert peak_of_law(made) == pytest.approx(0.2, rel=1e-12)
     (found,) = made.verdict.findings
     assert found.kind == "tool_angular_speed"
@@ -65,7 +67,7 @@ def test_a_speed_and_a_duration_are_kept_although_the_rotation_is_too_fast_then(
 )
 def test_a_trapezoid_of_a_duration_has_the_ramps_that_are_named(target, law, way, acceleration):
     """A speed of what the tool does not do says nothing; ramps that are named are not made flatter by limits."""
-    made = planned("ur5e", START, line(target, law=law))
+    made = planned("ur5e", START, line(target, law=law), advise=False)
     assert made.trajectory.duration == pytest.approx(2, abs=1e-12)
     assert peak_of_law(made) == pytest.approx(trapezoid_speed(way, 2, acceleration), rel=1e-9)
 

@@ -56,7 +56,7 @@ def by_differences(path: ToolPath, law: LawPieces, limits: ToolLimits) -> np.nda
 )
 def test_the_excess_is_the_largest_share_of_a_limit(limits):
     path, rng = rounded_path(), np.random.default_rng(3)
-    parts = np.linspace(0.0, 1.0, 13)[:-1]
+    parts = np.linspace(0.0, 1.0, 9)[:-1]
     grid = np.append((path.breaks[:-1, None] + np.diff(path.breaks)[:, None] * parts).ravel(), path.length)
     x = rng.uniform(0.05, 0.2, grid.size)
     law = law_pieces(grid, x)

@@ -31,7 +31,7 @@ def turning(turns, lengths, bend, radius, shape="trapezoid"):
 
 def peak(made):
     """Return the largest angular acceleration, from the joints alone."""
-    return tool_rates(made, times_of(made, 8001))[3].max()
+    return tool_rates(made, times_of(made, 4001))[3].max()
 
 
 @pytest.mark.full
