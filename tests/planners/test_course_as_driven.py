@@ -88,8 +88,15 @@ FURTHER = {
 }
 
 
-@pytest.mark.parametrize("along", [INFINITE, (0.7, 0.4, 5.0), (0.7, 5.0, 0.4)])
-@pytest.mark.parametrize("name", BENT)
+@pytest.mark.parametrize(
+    ("name", "along"),
+    [
+        (name, along)
+        for k, name in enumerate(BENT)
+        for j, along in enumerate([INFINITE, (0.7, 0.4, 5.0), (0.7, 5.0, 0.4)])
+        if (k + j) % 2 == 0
+    ],
+)
 def test_bounds_of_cells_are_those_of_the_states_that_limits_allow_in_them(
     name: str, along: tuple[float, ...]
 ) -> None:

@@ -48,7 +48,7 @@ def along_tool(course: JointCourse, s: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def used(course: JointCourse, part: FlownPart, tempo: float = 1.0) -> float:
     """Return what a motion uses of its limits at most, at a slower pace of lower ones."""
     assert part.law is not None
-    times = np.linspace(part.law.start, part.law.end, 4001)
+    times = np.linspace(part.law.start, part.law.end, 1501)
     s, sd, sdd, sddd = part.law.evaluate_orders(times, (0, 1, 2, 3), side="left")[..., 0].T
     line = np.abs(course.curve.coefficients[0, 0]).max()
     first, second = along_tool(course, s)

@@ -63,8 +63,14 @@ def chain_with(moves: str) -> tuple[FlyByChain, float]:
 
 
 @cache
+def known_laws() -> CourseLaws:
+    """Return laws along the courses of these chains, each looked for once."""
+    return CourseLaws()
+
+
+@cache
 def _searched() -> motion_search.MotionSearch:
-    search = motion_search.MotionSearch(CourseLaws(), by_order=True)
+    search = motion_search.MotionSearch(known_laws(), by_order=True)
     search.fastest(chain_with("lines")[0])
     return search
 
@@ -82,7 +88,7 @@ def test_a_chain_with_the_states_of_a_motion_that_stops_is_no_slower(moves, pace
     """Even at a lower pace in its zone than elsewhere its motion is one: then it takes that much longer."""
     chain, stopping = chain_with(moves)
     chain = with_shares(chain, pace ** POWERS[None])
-    laws = StoppingLaws(CourseLaws())
+    laws = StoppingLaws(known_laws())
     assert laws.slow_all(chain)
     assert not laws.slow_all(chain)
     row = row_of(chain, [1.0, 1.0], [1.0, 1.0], laws.states(chain))
@@ -269,6 +275,14 @@ def test_where_a_calmer_state_is_no_help_the_pace_is_lowered(index, side, larges
 
     asked: list = []
     chain, search = chain_with("lines")[0], searched()
+    row, found = search._motion.row, FoundStates(search._motion.states, (search.model,))
+    search._near = found.states
+    search._laws._found = {
+        key: law
+        for key, law in known_laws()._found.items()
+        if key[1] != index  # of the other course
+    }
+    monkeypatch.setattr(motion_search.MotionSearch, "_searched", lambda *given: (found, row))
     monkeypatch.setattr(looked_for, "_law_between", refusing(index, side, largest))
     monkeypatch.setattr(motion_search.MotionSearch, "_ease", eased)
     monkeypatch.setattr(motion_search.MotionSearch, "_pace", lambda search, number: 1.0)
@@ -473,16 +487,14 @@ def test_a_chain_that_begins_in_motion_does_so_at_any_pace(moves, start):
     chain, _ = chain_with(moves)
     chain = replace(chain, ends=(np.array(start), np.zeros(2)))
     first, bend = chain.courses[0].curve.evaluate_orders(np.zeros(1), (1, 2))[0]
-    asked, known = (start[0] * first, start[1] * first + start[0] ** 2 * bend), CourseLaws()
+    asked, known = (start[0] * first, start[1] * first + start[0] ** 2 * bend), known_laws()
     for pace in (1.0, 0.6):
         laws, slow = StoppingLaws(known), with_shares(chain, pace ** POWERS[None])
         laws.slow_all(slow)
         states = np.array([*laws.states(slow).values()])
         for part in (
             laws.parts(slow)[0],
-            CourseLaws().along(
-                chain.courses[0], 0, chain.stretch(0), np.stack([chain.ends[0], states[0]]), 1.0
-            ),
+            known.along(chain.courses[0], 0, chain.stretch(0), np.stack([chain.ends[0], states[0]]), 1.0),
         ):
             for order, rates in enumerate(asked, 1):
                 assert part.curve.evaluate(part.curve.start, order) == pytest.approx(

@@ -108,8 +108,6 @@ def test_phases_in_which_a_force_binds_are_named_by_it() -> None:
 @pytest.mark.parametrize(
     ("law", "limits", "jerk"),
     [
-        ({"jerk": 20.0}, {}, 20.0),
-        ({}, {"tcp": {"jerk": 20.0}}, 20.0),
         ({"jerk": 20.0}, {"tcp": {"jerk": 90.0}}, 20.0),
         ({}, {"jerk": [20.0, None]}, 20.0),
         ({}, {"jerk": [20.0, None], "tcp": {"jerk": 5.0}}, 5.0),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from tiers import few
@@ -50,27 +52,27 @@ def test_free_orientation_of_a_small_arm(shape):
     assert 0.4 < turning(made) <= 0.5 * (1 + 1e-6)
 
 
+@cache
+def small_arm(limit):
+    """Return the plan of a time-optimal line of a planar arm with one limit of turning."""
+    robot = {"name": "planar", "convention": "standard", "joints": [{"a": 0.5}, {"a": 0.5}]}
+    move = {"planner": "line", "to": {"xyz": [0.1, 0.6, 0]}, "law": {"shape": "time_optimal"}}
+    return planned(robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": {limit: 0.4}})
+
+
 @pytest.mark.parametrize("limit", ["angular_speed", "angular_acceleration"])
 def test_one_limit_of_turning_is_enough_for_a_free_turn_to_count(limit):
     """A time-optimal law uses all of it, and 0.6 of an acceleration that is not along its axis alone."""
-    joint = {"a": 0.5}
-    robot = {"name": "planar", "convention": "standard", "joints": [joint, joint]}
-    move = {"planner": "line", "to": {"xyz": [0.1, 0.6, 0]}, "law": {"shape": "time_optimal"}}
-    made = planned(robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": {limit: 0.4}})
+    made = small_arm(limit)
     assert not made.verdict.findings
-    times = np.linspace(0, made.trajectory.duration, 20001)
+    times = np.linspace(0, made.trajectory.duration, 5001)
     rates = made.trajectory.curve.evaluate(times, 1 if limit == "angular_speed" else 2)
     assert 0.5 * 0.4 < np.abs(rates.sum(axis=1)).max() <= 0.4 * (1 + 1e-6)
 
 
 def test_a_free_turn_uses_its_angular_acceleration_all_the_way():
     """Along the line the arm turns one way: it speeds up over half of the turn, and slows down over the other."""
-    robot = {"name": "planar", "convention": "standard", "joints": [{"a": 0.5}, {"a": 0.5}]}
-    move = {"planner": "line", "to": {"xyz": [0.1, 0.6, 0]}, "law": {"shape": "time_optimal"}}
-    made = planned(
-        robot, {"joints": [0.1, 0.8]}, move, limits={**LIMITS, "tcp": {"angular_acceleration": 0.4}}
-    )
-    curve = made.trajectory.curve
+    curve = small_arm("angular_acceleration").trajectory.curve
     turns = curve.evaluate(np.linspace(0, curve.end, 2001)).sum(axis=1)
     assert (np.diff(turns) >= 0).all()
     assert curve.duration == pytest.approx(2 * np.sqrt((turns[-1] - turns[0]) / 0.4), rel=1e-2)

@@ -45,7 +45,7 @@ def test_the_least_acceleration_of_a_trapezoid_is_a_triangle_that_passes(length,
         assert np.abs(jerks).max() < 1e3
 
 
-@pytest.mark.parametrize("rounding", [-3, -2, -1, 0, 1, 2, 3])
+@pytest.mark.parametrize("rounding", few([-3, -2, -1, 0, 1, 2, 3], 4))
 def test_rounding_of_the_length_makes_no_cruise(rounding):
     """The issue's example, 100 mm in 2 s with 100 mm/s^2, its start off by rounding."""
     start = {"xyz": [0.4, 0.1 + rounding * 2e-15, 0.3], "rpy": DOWN}

@@ -106,7 +106,8 @@ def test_doubled_points_are_one() -> None:
 
 def test_of_a_doubled_point_the_least_radius_counts() -> None:
     twice = "{line: {xyz: [400, 200, 200]}, radius: 0}"
-    plan = planned(f"{twice}\n      - {TURN}")
+    jerk, law = ("jerk: 8000, ", ""), ("law: {shape: time_optimal}", "law: {shape: trapezoid}")
+    plan = planned(f"{twice}\n      - {TURN}", jerk, law)
     tool = plan.moves[0].planned.tool
     assert tool is not None
     (corner,) = tool.path.poses.position.corners  # type: ignore[attr-defined]

@@ -23,6 +23,7 @@ JERKY = {"velocity": 3.0, "acceleration": 12.0, "jerk": 150.0}
 SPEEDS = (0.1, 0.4, None, 0.05)  # None: that of the move
 
 
+@cache
 def straight(speeds, lengths, **law):
     """Return the plan of segments of one straight line on three sliding joints."""
     segments = [
@@ -156,7 +157,7 @@ def test_segments_with_equal_speeds_are_one_in_the_report():
 
 
 def test_pictures_show_limits_that_step():
-    made = bent()
+    made = straight((0.1, 0.4, 0.25, 0.05), (0.1, 0.2, 0.2, 0.1))
     line = PlannedMotion(made).tool_limit(angular=False)
     assert line[:, 1].tolist() == [0.1, 0.1, 0.4, 0.4, 0.25, 0.25, 0.05, 0.05]
     assert (np.diff(line[:, 0]) >= 0).all()

@@ -129,21 +129,21 @@ def test_about_a_line_the_distance_from_the_weave_is_proven(shape):
 
 
 def test_a_half_cycle_more_ends_on_the_seam_too():
-    made = weaving(weave={"length": 0.2 / 19.5})
+    made = weaving({"to": {"xyz": [0.4, -0.02, 0.3]}}, {"length": 0.08 / 7.5})
     assert not [e for e in made.moves[0].planned.events if e.kind == "weave_fitted"]
     s, places = on_rows(made)
     assert (
-        np.abs(np.abs(places[:, 0] - 0.4) - np.abs(A * np.sin(2 * np.pi * s * 19.5 / 0.2))).max() < TOLERANCE
+        np.abs(np.abs(places[:, 0] - 0.4) - np.abs(A * np.sin(2 * np.pi * s * 7.5 / 0.08))).max() < TOLERANCE
     )
 
 
 def test_other_lengths_are_fitted_and_told():
-    made = weaving(weave={"length": 0.011})
+    made = weaving({"to": {"xyz": [0.4, -0.02, 0.3]}}, {"length": 0.011})
     (event,) = (e for e in made.moves[0].planned.events if e.kind == "weave_fitted")
-    assert event.amounts["used"].value == pytest.approx(0.2 / 18)
+    assert event.amounts["used"].value == pytest.approx(0.08 / 7)
     assert not event.concedes
     s, places = on_rows(made)
-    assert np.abs(np.abs(places[:, 0] - 0.4) - np.abs(A * np.sin(2 * np.pi * s * 18 / 0.2))).max() < TOLERANCE
+    assert np.abs(np.abs(places[:, 0] - 0.4) - np.abs(A * np.sin(2 * np.pi * s * 7 / 0.08))).max() < TOLERANCE
 
 
 @pytest.mark.full

@@ -52,8 +52,15 @@ def test_times_that_are_found_keep_the_smaller_of_limit_and_own_acceleration(
     assert largest(made) == pytest.approx(used, rel=1e-6)
 
 
-@pytest.mark.parametrize("blends", [{}, {"blend_durations": [0.2, 0.3, 0.35, 0.25]}, {"blend_durations": 3}])
-@pytest.mark.parametrize("ends", ["centred", "inside"])
+@pytest.mark.parametrize(
+    ("ends", "blends"),
+    [
+        ("centred", {}),
+        ("inside", {}),
+        ("centred", {"blend_durations": [0.2, 0.3, 0.35, 0.25]}),
+        ("inside", {"blend_durations": 3}),
+    ],
+)
 def test_a_duration_is_that_of_the_whole_motion_with_its_blends(ends: str, blends: dict[str, object]) -> None:
     """Ends may have other blends, or too little room for them; with them all times keep their proportions."""
     limits = {"velocity": 1, "acceleration": [9, 7] if blends else [3, 1]}

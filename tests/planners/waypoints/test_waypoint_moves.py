@@ -356,9 +356,7 @@ def by_jerk_alone() -> float:
     return float(plan_of({"waypoints": POINTS, "limits": free}).trajectory.duration)
 
 
-@pytest.mark.parametrize(
-    ("limit", "jerk"), [(1e3, 20.0), (1e6, 20.0), (1e12, 20.0), (10.0, 2e-8), (1e12, 2e13)]
-)
+@pytest.mark.parametrize(("limit", "jerk"), [(1e6, 20.0), (1e12, 20.0), (10.0, 2e-8), (1e12, 2e13)])
 def test_limits_out_of_reach_do_not_matter(limit, jerk):
     """Where jerk alone limits, times go with its third root; 1e6 beside 20 ended in a traceback."""
     wide = {"velocity": [limit] * 3, "acceleration": [limit] * 3, "jerk": [jerk] * 3}
