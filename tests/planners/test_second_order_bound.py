@@ -24,20 +24,14 @@ PLANAR = {"velocity": 3, "acceleration": 8, "jerk": 60}
 TARGETS = [[0.9, 1.25], [1.0, 2.0], [0.2, 1.0]]
 
 
-def job_of(*targets: list[float], zone: float = 0.02, limits: dict[str, float] = PLANAR) -> Plan:
+def text_of(*targets: list[float], zone: float = 0.02, limits: dict[str, float] = PLANAR) -> str:
     moves = [{"planner": "jerk_limited", "to": {"joints": joints}} for joints in targets]
-    return _planned(
-        json.dumps(
-            {
-                "version": 1,
-                "robot": "planar2r",
-                "limits": limits,
-                "zone": zone,
-                "start": {"joints": [0.3, 1.2]},
-                "moves": moves,
-            }
-        )
-    )
+    job = {"version": 1, "robot": "planar2r", "limits": limits, "zone": zone}
+    return json.dumps({**job, "start": {"joints": [0.3, 1.2]}, "moves": moves})
+
+
+def job_of(*targets: list[float], zone: float = 0.02, limits: dict[str, float] = PLANAR) -> Plan:
+    return _planned(text_of(*targets, zone=zone, limits=limits))
 
 
 @cache
@@ -145,8 +139,7 @@ def test_a_straight_course_between_speeds_is_a_trapezoid():
 
 
 def arm() -> Robot:
-    plan = job_of(*TARGETS[:2], limits={"velocity": 3, "acceleration": 8})
-    return plan.moves[0].robot
+    return job_from_text(text_of(*TARGETS[:2], limits={"velocity": 3, "acceleration": 8})).robot
 
 
 def lasting(part: CoursePart, first: float, last: float) -> float:

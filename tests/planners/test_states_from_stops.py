@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +23,7 @@ FAST = np.array([[0.0, 0.0], [2.0, -3.0], [1.9, 4.0], [1.8, -5.0], [1.7, 2.5], [
 OF_BORDERS = [0, 1, 1, 2]  # the course that each is on
 
 
+@cache
 def chain() -> FlyByChain:
     """Return three lines of planar2r with zones of 20 mm between them."""
     rows = [np.tile([-most, most], (2, 1)) for most in (np.inf, 3.0, 8.0, 60.0)]
@@ -31,8 +33,10 @@ def chain() -> FlyByChain:
     return chain_of(courses, zones, (np.zeros(2), np.zeros(2)), [1.0, 1.0])
 
 
-def stopping(of: FlyByChain, border: int) -> np.ndarray:
+@cache
+def stopping(border: int) -> np.ndarray:
     """Return speed and acceleration of the law from stop to stop where it is at a border, by samples."""
+    of = chain()
     corner = of.corners[border // 2]
     law = StoppingLaws(CourseLaws()).law(of, OF_BORDERS[border]).law
     assert law is not None
@@ -48,7 +52,7 @@ def test_a_state_comes_from_the_faster_one_in_three_steps_and_stays(border: int)
     of, laws, index = chain(), StoppingLaws(CourseLaws()), OF_BORDERS[border]
     first, last = of.stretch(index)
     near = None if index != 1 else first if border % 2 else last
-    slow, fast = stopping(of, border), FAST[border + 1]
+    slow, fast = stopping(border), FAST[border + 1]
     for step, share in enumerate((0.6, 0.3, 0.0, 0.0)):
         laws.slow(of, index, near, 0.1 * FAST if step else FAST)
         found = laws.states(of)
@@ -93,7 +97,7 @@ def test_states_are_as_slow_as_course_and_zones_beside_it(slower: str) -> None:
         index = OF_BORDERS[border]
         share = paces[index] / (1 - 1e-6 * (index == 1))
         assert state == pytest.approx(plain.states(of)[border] * [share, share**2], rel=1e-9)
-        assert state[0] == pytest.approx(stopping(of, border)[0] * paces[index], rel=3e-7)
+        assert state[0] == pytest.approx(stopping(border)[0] * paces[index], rel=3e-7)
     states = laws.states(other)
     for index, part in laws.parts(other).items():
         way = POINTS[index + 1] - POINTS[index]

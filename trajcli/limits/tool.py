@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from trajcli.limits.tool_bound import ToolPeak, tool_bounds
 from trajcli.trajectory import State, Trajectory
 
 SMOOTH = "a planner or a law whose acceleration does not step"
+_KNOWN = WeakKeyDictionary[PiecewisePolynomial, tuple[object, Mapping[str, ToolPeak]]]()
+"""Of the move of each curve that was asked for last: the only move of a plan is judged twice."""
 _LEVER = 1e-12  # m, or of an axis: what rounding makes of a joint that does not move the tool
 _SMOOTH_HINT = f"use {SMOOTH}, or leave the limit of the tool's {{words}} out"
 
@@ -164,8 +167,12 @@ FAMILY = ToolFamily()
 
 def peaks_in(move: LimitedMove, robot: Robot) -> Mapping[str, ToolPeak]:
     """Return `tool_peaks` of a move; times count from its start."""
-    breaks, coefficients = move.pieces
-    return tool_peaks(robot, breaks - move.span.start, coefficients)
+    key, curve = (robot, move.numbers, move.span.start), move.trajectory.curve
+    known = _KNOWN.get(curve)
+    if known is None or known[0] != key:
+        breaks, coefficients = move.pieces
+        known = _KNOWN[curve] = key, tool_peaks(robot, breaks - move.span.start, coefficients)
+    return known[1]
 
 
 def tool_peaks(robot: Robot, breaks: Array, coefficients: Array) -> Mapping[str, ToolPeak]:

@@ -206,12 +206,11 @@ def test_a_larger_tolerance_is_proposed_where_it_helps(limited: bool) -> None:
     """Beside the hole of its workspace a joint turns by a radian within a millimetre."""
     start = {"xyz": [0.5, 0.20001, 0], "configuration": UP}
     limits = {**FREE, "tcp": {"speed": 2}} if limited else FREE
-    problem = problem_of(HOLLOW, start, straight(-0.5, 0.20001), limits=limits)
-    assert "pieces do not meet the tolerance on this path" in problem.message
     larger = straight(-0.5, 0.20001, tolerance={"position": 0.01, "angle": 0.01})
+    problem = problem_of(HOLLOW, start, larger if limited else straight(-0.5, 0.20001), limits=limits)
+    assert "pieces do not meet the tolerance on this path" in problem.message
     if limited:
-        again = problem_of(HOLLOW, start, larger, limits=limits)
-        assert "limits of the tool ask for 1e-6 m and rad" in (again.hint or "")
+        assert "limits of the tool ask for 1e-6 m and rad" in (problem.hint or "")
     else:
         plan(HOLLOW, start, larger, limits=limits)
     assert ("`tolerance`" in (problem.hint or "")) != limited

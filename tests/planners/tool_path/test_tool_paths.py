@@ -222,7 +222,7 @@ def test_what_overlapping_segments_do_together_keeps_the_limits_of_the_tool(name
     """Both may cruise, speed up, or turn at once; plan() wants the verdict of all limits to pass."""
     tcp = {"speed": 0.5, "acceleration": 3.0, "angular_speed": 2.0, "angular_acceleration": 12.0}
     targets, overlap = TOGETHER[name], (0.1, 0.25)[number]
-    shape = ("trapezoid", "quintic")[(number + [*TOGETHER].index(name) // 2) % 2]
+    shape = ("trapezoid", "quintic")[(number + [*TOGETHER].index(name)) % 2]
     made = plan("ur5e", START, across(*targets, overlap=overlap, shape=shape), limits={"tcp": tcp})
     velocity, acceleration = rates(made, times_of(made, 2001))
     sizes = [velocity[:, :3], acceleration[:, :3], velocity[:, 3:], acceleration[:, 3:]]
