@@ -18,7 +18,7 @@ from trajcli.limits.tool_bound import ToolPeak, tool_bounds
 from trajcli.trajectory import State, Trajectory
 
 SMOOTH = "a planner or a law whose acceleration does not step"
-_KNOWN = WeakKeyDictionary[PiecewisePolynomial, tuple[object, Mapping[str, ToolPeak]]]()
+_SURVEYED = WeakKeyDictionary[PiecewisePolynomial, tuple[object, Mapping[str, ToolPeak]]]()
 """Of the move of each curve that was asked for last: the only move of a plan is judged twice."""
 _LEVER = 1e-12  # m, or of an axis: what rounding makes of a joint that does not move the tool
 _SMOOTH_HINT = f"use {SMOOTH}, or leave the limit of the tool's {{words}} out"
@@ -168,11 +168,11 @@ FAMILY = ToolFamily()
 def peaks_in(move: LimitedMove, robot: Robot) -> Mapping[str, ToolPeak]:
     """Return `tool_peaks` of a move; times count from its start."""
     key, curve = (robot, move.numbers, move.span.start), move.trajectory.curve
-    known = _KNOWN.get(curve)
-    if known is None or known[0] != key:
+    last = _SURVEYED.get(curve)
+    if last is None or last[0] != key:
         breaks, coefficients = move.pieces
-        known = _KNOWN[curve] = key, tool_peaks(robot, breaks - move.span.start, coefficients)
-    return known[1]
+        last = _SURVEYED[curve] = key, tool_peaks(robot, breaks - move.span.start, coefficients)
+    return last[1]
 
 
 def tool_peaks(robot: Robot, breaks: Array, coefficients: Array) -> Mapping[str, ToolPeak]:
