@@ -211,9 +211,9 @@ class RecordedPath:
 
         Where a path comes back to a place, or goes to and fro, the orientation tells when it is there.
         """
-        groups = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
-        if len(groups) == 1:
+        if near[-1] - near[0] < near.size:
             return near
+        groups = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
         poses = np.broadcast_to(pose, (len(groups), 4, 4))
         nearest = [group[square[group].argmin()] for group in groups]
         off = (self._sizes(self._refined(self._s[nearest], poses), poses) / self._limits).max(axis=1)
@@ -232,7 +232,9 @@ class RecordedPath:
             apart = self._apart(reference.poses, poses, turning=turning)
             size = np.maximum((slope**2).sum(axis=1), 1e-300)
             change = np.clip((slope * apart).sum(axis=1) / size, -step, step)
-            s = np.clip(s + change, low, high)
+            before, s = s, np.clip(s + change, low, high)
+            if np.array_equal(s, before):
+                break
         return np.asarray(s)
 
     def _followed(self, square: Array, own: Array, t: Array, poses: Array) -> NDArray[np.intp]:
@@ -251,7 +253,7 @@ class RecordedPath:
                 found[k] = start + square[k, start:end].argmin()
             else:
                 at, last, time = self._before
-                moved = float(np.linalg.norm(coordinates - last))
+                moved = float(np.sqrt((coordinates - last) @ (coordinates - last)))
                 reach = _FURTHER * max(moved, self._step) + self._fast * (float(t[k]) - time) + self._slack
                 self._step = moved  # around the end of a way that is its own way back the next one is short
                 low, high = np.searchsorted(self._s, [at - reach, at + reach])

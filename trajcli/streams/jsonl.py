@@ -19,7 +19,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.number_cells import decimals_of
+from trajcli.streams.number_cells import scan_decimals
 from trajcli.streams.recorded.column_names import read_name
 from trajcli.streams.recorded.column_roles import NamedFile
 from trajcli.streams.row_sources import EXACT, FULL_DECIMALS
@@ -170,9 +170,8 @@ class JsonRows:
 
     def _block(self, rows: list[list[float]], taken: Sequence[int]) -> Array:
         if self._decimals.max(initial=0) < FULL_DECIMALS:
-            columns = zip(*rows, strict=True)
-            decimals = [max(decimals_of(repr(value).encode()) for value in column) for column in columns]
-            self._decimals = np.maximum(self._decimals, decimals)
+            text = "\n".join([*(",".join(map(repr, row)) for row in rows), ""])
+            self._decimals = np.maximum(self._decimals, scan_decimals(text.encode(), self._width)[1])
         return np.array(rows, dtype=np.float64)[:, list(taken)]
 
     def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:

@@ -142,7 +142,7 @@ def compare_with_plan(
     factors = np.array([mapped.get(name, column.factor) for name, column in named])
     of_file = _Rows(rows, columns, factors, groups, index, kept)
     difference = None
-    for grid in _grids(plan, stamps):
+    for grid in _grids(plan, stamps, groups):
         if grid.count != stamps.count or not _stands_on(of_file, grid, stamps):
             continue
         first = _first_difference(of_file, plan, grid, halves * factors, stamps)
@@ -242,14 +242,14 @@ def halves_of(rows: RowSource, columns: Sequence[Column], still: NDArray[np.bool
     return np.asarray(halves)
 
 
-def _grids(plan: Plan, stamps: _Stamps) -> Iterator[Grid]:
+def _grids(plan: Plan, stamps: _Stamps, groups: Sequence[Group]) -> Iterator[Grid]:
     """Yield the grids of a plan on which rows may stand, one after the other: knots cost a search."""
     output, trajectory = plan.loaded.job.output, plan.trajectory
     if output.times is not None:
         yield ListedGrid(trajectory.duration, np.array(output.times), output.start_time)
     for rate in _rates(plan, stamps):
         yield UniformGrid(trajectory.duration, rate, stamps.first)
-    for stated in (2, 3) if has_knots(trajectory) else ():
+    for stated in ((3,) if "qdd" in groups else (2, 3)) if has_knots(trajectory) else ():
         knots = knots_of(trajectory, stated)
         yield knot_grid(trajectory, knots, None, stamps.first)
         if stamps.count > knots.times.size:
