@@ -130,7 +130,7 @@ def test_rows_begin_in_the_first_lap(first: float) -> None:
 @pytest.mark.parametrize("first", [0.0, 0.15, 0.31, 0.45])
 def test_rows_may_begin_on_their_way(first: float) -> None:
     """Beside another part of the path, which is 4 mm away and passed before."""
-    s = np.arange(first, 0.604, 0.002)
+    s = np.arange(first, 0.604, 0.004)
     assert deviations(HAIRPIN, along(HAIRPIN, s)) == []
     aside = along(HAIRPIN, s)
     aside[0, 1] += 1e-4

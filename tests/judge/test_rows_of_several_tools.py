@@ -38,7 +38,7 @@ moves:
   - {tool: bent}
   - {planner: line, to: {from: here, offset: {xyz: [0, 0, -0.05]}}, law: {shape: quintic, duration: 1}}
   - {tool: long}
-  - {planner: quintic, to: {joints: [5, -85, 85, 0, 85, 5]}, duration: 2}
+  - {planner: quintic, to: {joints: [5, -85, 85, 0, 85, 5]}, duration: 1}
 output: {rate: 100, columns: [COLUMNS]}
 """
 

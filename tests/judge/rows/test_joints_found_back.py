@@ -69,8 +69,8 @@ moves:
 """
 
 
-def planned(job: str, columns: str) -> Plan:
-    return planned_with_output(job, f"{{rate: 50, columns: {columns}}}")
+def planned(job: str, columns: str, rate: int = 50) -> Plan:
+    return planned_with_output(job, f"{{rate: {rate}, columns: {columns}}}")
 
 
 def found(plan: Plan, folder: Path, stretch: float = 1.0) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -115,7 +115,7 @@ EXACT = (2e-6, 2e-5, 2e-4)
 )
 def test_joints_and_their_rates_are_those_of_the_curve(job, columns, known, stretch, tmp_path) -> None:
     """Distances alone say nothing of a move without a path, of which other rows than the plan's are known nearly."""
-    plan = planned(job, columns)
+    plan = planned(job, columns, 20)
     t, states = found(plan, tmp_path, stretch)
     assert len(states) == known
     on_path = t >= (0.0 if stretch == 1.0 or "pose" in columns else plan.trajectory.spans[-1].start)

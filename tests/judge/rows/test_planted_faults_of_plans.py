@@ -42,7 +42,7 @@ def random_plan(seed: int) -> Plan | None:
     fields = random_jobs.random_job(
         rng, TAGS[seed % len(TAGS)], int(rng.integers(2, 5)), rest=bool(rng.random() < 0.7), unlimited=0.05
     )
-    fields |= {"output": {"rate": int(rng.choice([500, 250, 125, 100, 30]))}, "when_over_limit": "slow"}
+    fields |= {"output": {"rate": int(rng.choice([200, 125, 100, 60, 30]))}, "when_over_limit": "slow"}
     if TAGS[seed % len(TAGS)] in ("blends", "cubic", "spline", "trapezoid"):  # their accelerations may step
         fields["limits"] = {"jerk": None}
     try:

@@ -25,7 +25,7 @@ EVERYTHING = "[t, q, qd, qdd, pose, twist, twistd, path, move]"
 ALONE = ("[t, pose]", "[t, pose, twist]", "[t, twist, twistd]", "[t, twist]", "[t, path]", "[t, path, move]")
 
 
-def planned(columns: str, rate: int = 100) -> Plan:
+def planned(columns: str, rate: int = 50) -> Plan:
     return planned_with_output(JOB, f"{{rate: {rate}, columns: {columns}}}")
 
 
@@ -241,7 +241,7 @@ def test_few_decimals_of_a_group_are_no_faults_and_hide_few(
 
 @pytest.mark.parametrize(("name", "columns"), [("sd_mm", EVERYTHING), ("vz_mm", "[t, q, twist]")])
 def test_a_rate_that_is_none_is_found(name: str, columns: str, tmp_path: Path) -> None:
-    plan, file = planned(columns), tmp_path / "rows.csv"
+    plan, file = planned(columns, 100), tmp_path / "rows.csv"
     names, rows = written(plan, file)
     right = judged(plan, names, rows[:-1], file)
     assert not [finding for finding in right.findings if finding.kind in ("derivative", "tool", "jump")]
