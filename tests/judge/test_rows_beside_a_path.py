@@ -129,9 +129,7 @@ def test_a_row_before_the_start_or_behind_the_end_is_beside_the_line(row: int, b
     assert (found.row, found.value) == (row + 1, pytest.approx(abs(by), rel=1e-6))
 
 
-@pytest.mark.parametrize(
-    ("piece", "blocks"), [(0, 60), (1, 1000), (59, 60), (60, 60), (69, 1000), (139, 60)]
-)
+@pytest.mark.parametrize(("piece", "blocks"), [(0, 60), (1, 1000), (59, 60), (60, 60), (69, 1000), (139, 60)])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_what_bulges_between_rows_on_the_line_is_found_in_the_middle(
     sign: int, piece: int, blocks: int

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -61,28 +63,33 @@ def made_plan(
             SimpleNamespace(index=k, robot=robot, planned=one)
             for k, ((_, robot, _), one) in enumerate(zip(moves, planned, strict=True))
         ],
-        verdict=SimpleNamespace(
-            peaks=[_peaks(lengths, coefficients, a, b) for a, b in pairwise(borders.tolist())]
-        ),
+        verdict=_Verdict(lengths, coefficients, borders.tolist()),
         loaded=SimpleNamespace(robot=moves[0][1], output_units=units or Units()),
     )
 
 
+@dataclass
+class _Verdict:
+    """What is asked of a verdict: the peaks of each move, made where they are asked for."""
+
+    lengths: Sequence[float]
+    coefficients: np.ndarray
+    borders: Sequence[int]
+
+    @cached_property
+    def peaks(self) -> list[Any]:
+        return [_peaks(self.lengths, self.coefficients, a, b) for a, b in pairwise(self.borders)]
+
+
 def _peaks(lengths: Sequence[float], coefficients: np.ndarray, first: int, last: int) -> list[Any]:
-    peaks = []
+    peaks, degree = [], len(coefficients) - 1
+    t = np.linspace(0, 1, 2001)[:, None] * lengths[first:last]
     for order in range(4):
-        values = np.concatenate(
-            [
-                np.stack(
-                    [
-                        np.polyval(np.polyder(row, order), np.linspace(0, lengths[k], 2001))
-                        for row in coefficients[:, k].T
-                    ],
-                    axis=1,
-                )
-                for k in range(first, last)
-            ]
-        )
-        low, high = values.min(axis=0), values.max(axis=0)
+        factors = [np.prod(np.arange(k - order + 1.0, k + 1)) for k in range(degree, order - 1, -1)]
+        derivative = coefficients[: max(degree + 1 - order, 0), first:last] * np.reshape(factors, (-1, 1, 1))
+        values = np.zeros((2001, last - first, coefficients.shape[2]))
+        for row in derivative:
+            values = values * t[..., None] + row
+        low, high = values.min(axis=(0, 1)), values.max(axis=(0, 1))
         peaks.append(SimpleNamespace(low=low, high=high, magnitude=np.maximum(high, -low)))
     return peaks

@@ -18,6 +18,7 @@ LIMITS = {
     "acceleration": "800 deg/s^2",
     "tcp": {"speed": 0.25, "acceleration": 1.5, "angular_speed": 1.5, "angular_acceleration": 9},
 }
+QUINTIC = {"shape": "quintic", "duration": 3}
 
 
 @cache
@@ -48,7 +49,7 @@ def test_a_screw_is_that_about_the_axis_by_which_its_target_was_made(angle: floa
     turn = np.radians(angle)
     away = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ [0.08, 0.06]
     xyz = [0.32 + away[0], 0.04 + away[1], 0.3 + advance]
-    move = {"planner": "screw", "to": {"xyz": xyz, "rpy": [180, 0, angle]}}
+    move = {"planner": "screw", "to": {"xyz": xyz, "rpy": [180, 0, angle]}, "law": QUINTIC}
     (screw,) = path_of(move).segments
     up = np.sign(angle)
     assert screw.kind == "screw"
@@ -63,7 +64,8 @@ def test_a_screw_is_that_about_the_axis_by_which_its_target_was_made(angle: floa
 def test_a_screw_that_does_not_turn_is_a_shift(turned: float, stated: bool) -> None:
     """Also where the target repeats the orientation: what rounding leaves of a turn has no axis."""
     rpy = {"rpy": [180, 0, turned]} if stated else {}
-    (screw,) = path_of({"planner": "screw", "to": {"xyz": [0.4, 0.22, 0.25], **rpy}}, turned=turned).segments
+    move = {"planner": "screw", "to": {"xyz": [0.4, 0.22, 0.25], **rpy}, "law": QUINTIC}
+    (screw,) = path_of(move, turned=turned).segments
     assert screw.kind == "screw"
     assert screw.axis == pytest.approx([0, 12 / 13, -5 / 13], abs=1e-9)
     assert (screw.angle, screw.point) == (0, None)
@@ -73,6 +75,7 @@ def test_a_screw_that_does_not_turn_is_a_shift(turned: float, stated: bool) -> N
 def test_a_helix_has_its_centre_its_pitch_and_its_ends() -> None:
     """A turn and a half about an upright axis 50 mm beside the start, 20 mm up in each."""
     move = {"planner": "arc", "center": [0.4, 0.15, 0.3], "axis": "z", "angle": 540, "pitch": 0.02}
+    move["law"] = QUINTIC
     path = path_of(move)
     (arc,) = path.segments
     assert (arc.kind, arc.unit, arc.angle_unit) == ("helix", "m", "deg")

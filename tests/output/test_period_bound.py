@@ -72,7 +72,7 @@ def test_a_path_of_the_tool_counts() -> None:
     """What a bound of cubics says of an arc, whose deviation and tool are judged where it says nothing."""
     with np.errstate(all="ignore"):
         plan = plan_job(
-            load_job(str(EXAMPLES / "planar_arc.yaml"), ("output.columns=[t, q, qd]", "output.rate=500"))
+            load_job(str(EXAMPLES / "planar_arc.yaml"), ("output.columns=[t, q, qd]", "output.rate=100"))
         )
     counts = [int(pieces_within(plan, 1 / rate, 2, 2e-7).sum()) for rate in (50, 500, 50_000)]
     assert counts[0] <= counts[1] < counts[2]

@@ -156,7 +156,7 @@ def test_points_of_a_message_are_in_si_from_its_start(rows: str | None, form: st
     asked = {} if rows is None else {"rows": rows}
     plan = planned(start_time=3.0, **asked, **({} if rows == "knots" else {"rate": 40}))
     path = delivered(plan, tmp_path / "a.yaml", form=FORMATS[form])
-    message = yaml.safe_load(path.read_text())
+    message = yaml.load(path.read_text(), yaml.CSafeLoader)
     points = message["trajectory"]["points"] if form == "ros-goal" else message["points"]
     stamps = [p["time_from_start"]["sec"] * 10**9 + p["time_from_start"]["nanosec"] for p in points]
     assert stamps[0] == 0
@@ -173,7 +173,8 @@ def test_points_of_a_message_are_in_si_from_its_start(rows: str | None, form: st
 def test_points_without_accelerations_are_those_of_cubics(tmp_path: Path) -> None:
     """As many as rows at knots are with the same columns."""
     plan = planned(columns=["t", "q", "qd"])
-    points = yaml.safe_load(delivered(plan, tmp_path / "a.yaml", form=FORMATS["ros"]).read_text())["points"]
+    text = delivered(plan, tmp_path / "a.yaml", form=FORMATS["ros"]).read_text()
+    points = yaml.load(text, yaml.CSafeLoader)["points"]
     assert {*points[0]} == {"positions", "velocities", "time_from_start"}
     assert len(points) == grid_of(planned(rows="knots", columns=["t", "q", "qd"])).count
     assert len(points) != grid_of(planned(rows="knots")).count

@@ -20,6 +20,22 @@ moves:
 output: {start_time: 10}
 """
 
+ALONG_A_PATH = """\
+version: 1
+units: {angle: deg, length: mm}
+robot: planar3r
+limits: {velocity: 180, acceleration: 900, tcp: {speed: 250, acceleration: 1500, angular_speed: 90}}
+start: {joints: [10, 80, -40]}
+moves:
+  - planner: path
+    law: {shape: time_optimal}
+    segments:
+      - {line: {from: here, offset: {xyz: [-100, 0, 0]}}, radius: 20}
+      - {line: {from: here, offset: {xyz: [-100, 100, 0]}}, radius: 20}
+      - {line: {from: here, offset: {xyz: [0, 100, 0]}}}
+  - {planner: quintic, to: {joints: [0, 60, 0]}, duration: 1}
+"""
+
 
 def many_joints(count: int) -> str:
     """Return a job of a robot with a lot of joints and long names."""

@@ -308,14 +308,14 @@ def test_files_over_a_job_are_brought_to_its_units(two: Plan) -> None:
 
 
 def test_rows_of_a_plan_lie_on_its_curves(example: Example, tmp_path: Path) -> None:
-    plan = example("dispense")  # its columns are t, pose, move
+    plan = example("weld_seam")  # its columns are t, pose, path, move
     write_plan(plan, str(tmp_path / "rows.csv"))
     picture = picture_of(plan, [read_csv(tmp_path / "rows.csv")])
     assert picture.views is not None
     (_, path), (source, rows) = picture.views.traces
     assert source == 1
     nearest = np.linalg.norm(rows[:, None] - path[None], axis=2).min(axis=1)
-    assert nearest.max() < 0.01
+    assert nearest.max() < 10.0  # mm
 
 
 def test_a_file_of_joints_moves_the_tool_of_the_job(example: Example, tmp_path: Path) -> None:

@@ -220,7 +220,7 @@ start: home
 points:
   home: {xyz: [400, 100, 300], rpy: [180, 0, 0], configuration: {shoulder: left, elbow: up, wrist: no_flip}}
   goal: {xyz: [500, 0, 300], rpy: [180, 0, 0]}
-limits: {acceleration: 900, jerk: 9000, tcp: {speed: 250, angular_speed: 60}}
+limits: {acceleration: 900, tcp: {speed: 250, angular_speed: 60}}
 output: {start_time: 5}
 moves:
   - {planner: hold, duration: 1}

@@ -46,10 +46,10 @@ def test_each_row_is_the_nearest_answer(monkeypatch, robot, smooth, rounds):
     rng = np.random.default_rng(3)
     low, high = np.array(arm.robot.limits.position).T
     if smooth:
-        s = np.linspace(0, 1, 200)[:, None]
+        s = np.linspace(0, 1, 80)[:, None]
         q = low + (high - low) * (0.5 + 0.4 * np.sin(5 * s + np.arange(len(low))))
     else:
-        q = rng.uniform(low, high, (120, len(low)))
+        q = rng.uniform(low, high, (50, len(low)))
     poses = forward(arm.robot, q)
     answers = followed(arm, poses)
     np.testing.assert_allclose(forward(arm.robot, answers), poses, atol=1e-6)
