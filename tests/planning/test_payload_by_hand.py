@@ -140,7 +140,7 @@ def test_where_gravity_alone_binds_its_time_is_that_of_the_pose(
     target: Sequence[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A free duration is no help: where the arm reaches out furthest, at one end of the move."""
-    monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 1e-6)
+    monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 2e-5)
     text = HEAD + "limits: {effort: {a: [-40, 60], b: 9}}\nstart: {joints: [90, 0]}\nmoves:\n"
     text += "  - {attach: {mass: 1}}\n  - {planner: hold, duration: 0.5}\n"
     text += f"  - {{planner: quintic, to: {{joints: {list(target)}}}}}\n  - {{planner: hold, duration: 1}}\n"

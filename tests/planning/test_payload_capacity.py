@@ -211,7 +211,8 @@ def test_what_flies_by_corners_carries_what_it_could_hold_with_stops(monkeypatch
         payload_capacity(job_from_text(unlimited))
 
 
-def test_an_arm_in_the_horizontal_that_rests_carries_anything() -> None:
+def test_an_arm_in_the_horizontal_that_rests_carries_anything(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("trajcli.planning.payload_capacity.LARGEST", 1e3)
     text = EMPTY.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
     text = text[: text.index("moves:")] + "moves: [{planner: hold, duration: 1}]\n"
     found = payload_capacity(job_from_text(text))
@@ -222,7 +223,14 @@ def test_an_arm_in_the_horizontal_that_rests_carries_anything() -> None:
     ("second", "where"),
     [("60", "at [60, 0, 0] mm of the tcp"), ("50", "at the centres of mass that the job says")],
 )
-def test_a_place_is_named_where_all_is_carried_there(second: str, where: str, tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
+def test_a_place_is_named_where_all_is_carried_there(
+    second: str,
+    where: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("trajcli.planning.payload_capacity.LARGEST", 1e3)
     text = EMPTY.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
     attached = [
         f"{{attach: {{mass: 1, com: [{x}, 0, 0]}}}}, {{planner: hold, duration: 1}}" for x in ("60", second)

@@ -169,7 +169,7 @@ def test_a_move_overrides_the_job() -> None:
 @few
 @given(
     seed=SEEDS,
-    tags=st.lists(st.sampled_from(TAGS), min_size=1, max_size=3),
+    tags=st.lists(st.sampled_from(TAGS), min_size=1, max_size=2),
     rate=st.sampled_from([1000.0, 500.0, 250.0, 30.0, 7.0]),
 )
 def test_align_gives_whole_periods(seed: int, tags: list[str], rate: float) -> None:
