@@ -23,7 +23,7 @@ def planned(robot: Any, to: dict[str, Any], start: list[float] | None = None) ->
         "robot": robot,
         "limits": {"acceleration": 400, "velocity": 100, "jerk": 4000},
         "start": {"joints": start or [0, 0, 0, 0, 20, 0]},
-        "moves": [{"planner": "jerk_limited", "to": to}],
+        "moves": [{"planner": "quintic", "to": to}],
     }
     return plan_job(job_from_text(json.dumps(job)))
 
