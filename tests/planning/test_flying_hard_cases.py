@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+from planning.test_flying_by import flown
 from tiers import QUICK, few
 
 from trajcli.checks.verify import verify
@@ -26,10 +28,15 @@ def to(*joints: float, **fields: Any) -> dict[str, Any]:
     return {"planner": "jerk_limited", "to": {"joints": list(joints)}, **fields}
 
 
+@cache
+def _planned(text: str) -> Plan:
+    return plan_job(job_from_text(text))
+
+
 def planned(*moves: dict[str, Any], **fields: Any) -> Plan:
     """Return the plan of a job of a planar arm with a zone of 20 mm, verified."""
     job = {"version": 1, "robot": "planar2r", "limits": LIMITS, "start": {"joints": [0.3, 1.2]}, "zone": 0.02}
-    plan = plan_job(job_from_text(json.dumps({**job, **fields, "moves": moves}, indent=1)))
+    plan = _planned(json.dumps({**job, **fields, "moves": moves}, indent=1))
     assert plan.verdict.passed, plan.verdict.findings
     return plan
 
@@ -222,7 +229,7 @@ def test_an_explicit_zone_that_cannot_be_is_refused_before_any_move_is_planned()
 
 
 def test_a_law_at_the_velocity_of_another_move_is_caught():
-    plan = planned(to(0.9, 1.25), to(1.0, 2.0))
+    plan = flown()
     limits = plan.moves[0].robot.limits
     slow = replace(plan.moves[0].robot, limits=replace(limits, velocity=limits.velocity / 3))
     promise = plan.moves[0].promise

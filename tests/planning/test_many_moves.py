@@ -114,6 +114,6 @@ def test_points_take_little_more_memory_than_their_curve(
         "curves.splines.cubic._VALUES",
     ):
         monkeypatch.setattr(f"trajcli.{name}", 256)
-    each = (_peak_of_points(tmp_path, 4000) - _peak_of_points(tmp_path, 2000)) / 2000
+    each = (_peak_of_points(tmp_path, 2000) - _peak_of_points(tmp_path, 1000)) / 1000
     of_curve = 8 * (4 * 6 + 1)  # bytes: four coefficients of each of six joints, and a break
     assert of_curve < each < 2.6 * of_curve  # zeros that nobody writes to are counted too, and are most of it

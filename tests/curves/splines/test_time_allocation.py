@@ -155,6 +155,10 @@ def test_no_durations_at_all():
     assert fastest_durations(family, np.ones(2), bounds(1, 3)) is None
 
 
+def test_what_uses_no_limit_has_no_smallest_durations():
+    assert fastest_durations(straight(np.zeros((3, 1))), np.ones(2), bounds(1, 3)) is None
+
+
 def test_it_says_the_same_every_time():
     family = smooth(points(6, 12, 2))
     first, second = (fastest_durations(family, np.ones(11), bounds(1, 3, joints=2)) for _ in range(2))
