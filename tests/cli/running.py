@@ -1,20 +1,25 @@
 """Run the command line, in a process of its own or in this one.
 
-A process of its own is a fresh one where a test is about its start, its signals or streams that are closed (`COMMAND`),
-and a copy of one that has imported everything elsewhere, which costs a tenth: `tests/test_docs.py` compares the two.
+A process of its own is a fresh one where a test is about its start or streams that are closed (`COMMAND`), a copy of this
+one where it is about signals (`begun`), and a copy of one that has imported everything elsewhere: these cost a tenth.
+`tests/test_docs.py` compares the first with the last.
 """
 
 from __future__ import annotations
 
 import fcntl
+import gc
 import io
 import os
 import pty
+import signal
 import struct
 import subprocess
 import sys
 import termios
 from contextlib import nullcontext, suppress
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest.mock import patch
@@ -63,6 +68,32 @@ def run(*arguments: str | Path, stdin: str = "", fresh: bool = False, **options:
         words, input=stdin, capture_output=True, text=True, timeout=60, check=False, **options
     )
     return Outcome(done.returncode, done.stdout, done.stderr)
+
+
+def begun(*arguments: str | Path, **options: Any) -> subprocess.Popen[bytes]:
+    """Begin the command in a copy of this process, which has imported it: signals reach it as they reach a fresh one."""
+    import_module(f"trajcli.cli.{arguments[0]}")
+    words = ["trajcli", *map(str, arguments)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(words, preexec_fn=partial(_become, words), **pipes, **options)  # noqa: PLW1509
+
+
+def _become(words: list[str]) -> None:
+    """Run the command in place of the program that a process, just begun, would run."""
+    os.closerange(3, 4096)  # who began it waits for one of these to be closed
+    gc.enable()
+    signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # as Python starts
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if callable(
+            signal.getsignal(number)
+        ):  # what is handled here is not handled there, what is ignored is
+            signal.signal(number, signal.SIG_DFL)
+    sys.stdin, sys.stdout, sys.stderr = os.fdopen(0), os.fdopen(1, "w"), os.fdopen(2, "w")
+    sys.argv = words
+    from trajcli.__main__ import main
+
+    main()
 
 
 def on_terminal(*arguments: str | Path, columns: int = 80, **environment: str) -> tuple[int, str]:

@@ -13,7 +13,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
-from running import COMMAND, ENDLESS, EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, SLOWED, call, run
+from running import COMMAND, ENDLESS, EXAMPLES, FAST, IMPOSSIBLE, JOB, ROOT, SLOWED, begun, call, run
 from tiers import few
 
 Capture = pytest.CaptureFixture[str]
@@ -332,8 +332,7 @@ def begin(*options: str) -> subprocess.Popen[bytes]:
         long=ENDLESS.replace("duration: 1", "duration: 1000"),
         longer=ENDLESS.replace("duration: 1", "duration: 2000"),
     )
-    words = [*COMMAND, "batch", "jobs", "-o", "out", "-j", "2", *options]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    return begun("batch", "jobs", "-o", "out", "-j", "2", *options, start_new_session=True)
 
 
 @pytest.mark.parametrize(("number", "code"), few([(signal.SIGINT, 130), (signal.SIGTERM, 143)], 1))

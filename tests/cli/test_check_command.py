@@ -27,7 +27,7 @@ limits: {acceleration: 400, jerk: 4000, tcp: {speed: "0.5 m/s"}}
 points: {home: {joints: [0, -90, 90, 0, 90, 0]}}
 start: home
 moves:
-  - {planner: jerk_limited, to: {joints: [20, -80, 80, 0, 90, 0]}}
+  - {planner: quintic, to: {joints: [20, -80, 80, 0, 90, 0]}, duration: 1}
   - {planner: line, to: {xyz: [0.5, 0.1, 0.5]}, law: {shape: quintic, duration: 2}}
   - {planner: quintic, to: home, duration: 3, limits: {velocity: 60}}
 output: {rate: 500, columns: [t, q, qd, qdd, move]}

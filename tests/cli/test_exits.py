@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from running import COMMAND, EXAMPLES, FAST, IMPOSSIBLE, JOB, LONG, ROOT, SLOWED, call, run, warm
+from running import COMMAND, EXAMPLES, FAST, IMPOSSIBLE, JOB, LONG, ROOT, SLOWED, begun, call, run, warm
 
 Capture = pytest.CaptureFixture[str]
 
@@ -96,8 +96,7 @@ def test_an_interrupt_is_130(tmp_path: Path) -> None:
 def test_a_closed_pipe_is_141_and_silent(tmp_path: Path) -> None:
     job = tmp_path / "job.yaml"
     job.write_text(LONG)
-    words = [*COMMAND, "plan", str(job), "-q"]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = begun("plan", job, "-q")
     assert process.stdout is not None
     assert process.stderr is not None
     assert process.stdout.readline() == HEADER.encode()

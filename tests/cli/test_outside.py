@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from running import COMMAND, ENDLESS, FAST, JOB, LONG, Outcome, call, warm
+from running import ENDLESS, FAST, JOB, LONG, Outcome, begun, call, warm
 from tiers import few
 
 SIGNALS = [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, 130)]
@@ -32,7 +32,7 @@ def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "job.yaml").write_text(JOB)
     (tmp_path / "fast.yaml").write_text(FAST)
-    (tmp_path / "endless.yaml").write_text(ENDLESS)
+    (tmp_path / "endless.yaml").write_text(ENDLESS.replace("1e6", "3e5"))
     return tmp_path
 
 
@@ -95,7 +95,7 @@ def test_help_that_nobody_reads_is_141(words: str) -> None:
 
 def started(folder: Path, *words: str) -> subprocess.Popen[bytes]:
     """Start a command that writes without end into `a.csv`, and wait until it does."""
-    process = subprocess.Popen([*COMMAND, *words], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = begun(*words, cwd=folder)
     until = time.monotonic() + 30
     while not any(part.stat().st_size for part in folder.glob(".*.part")):
         assert process.poll() is None, process.communicate()
@@ -121,8 +121,7 @@ def test_a_signal_ends_a_command_whose_reader_has_stopped(
     folder: Path, number: signal.Signals, code: int
 ) -> None:
     (folder / "long.yaml").write_text(LONG)
-    words = [*COMMAND, "plan", "long.yaml", "-q"]
-    process = subprocess.Popen(words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = begun("plan", "long.yaml", "-q", cwd=folder)
     assert process.stdout is not None
     assert os.read(process.stdout.fileno(), 9) == b"t,q1_deg\n"
     time.sleep(0.2)  # it waits for us to read on

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from planned_examples import share_plans
 from running import EXAMPLES, FAST, JOB, call
 
 from trajcli.cli.plan import (
@@ -102,7 +103,10 @@ def test_what_only_handles_is_no_move_and_times_count_from_the_start(job: Path, 
     assert err.startswith("job: verified, 1 move, 1 s\n")
 
 
-def test_what_was_computed_is_said_where_it_is_asked_for(capfd: Capture) -> None:
+def test_what_was_computed_is_said_where_it_is_asked_for(
+    capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    share_plans(monkeypatch)
     path = EXAMPLES / "time_optimal.yaml"
     brief, verbose = (call(capfd, "plan", path, "--no-output", *word).err for word in ((), ("-v",)))
     assert "  bound: " in verbose
