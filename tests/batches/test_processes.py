@@ -29,7 +29,7 @@ def killed() -> NoReturn:
 
 def endless() -> NoReturn:
     while True:
-        pass
+        time.sleep(0.01)
 
 
 def stubborn() -> NoReturn:

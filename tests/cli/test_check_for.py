@@ -28,7 +28,7 @@ def clean(profile: str) -> Rows:
     """Return a quintic by 0.2 rad of all joints at the period of a consumer."""
     joints = 6 if profile.startswith("ur") else 7
     period = PERIODS[profile]
-    count = 21 if period > 0.01 else round(1 / period) + 1
+    count = 21 if period > 0.01 else round(0.5 / period) + 1
     duration = period * (count - 1)
     u = np.linspace(0, 1, count)[:, None]
     change = np.full(joints, 0.2)
@@ -85,16 +85,16 @@ def step(row: int, joint: int, by: float) -> Callable[[Rows], None]:
 
 
 FAULTS = [
-    ("franka-fr3", late(400, 3e-4), "fr3-period", None, 401),
-    ("franka-fr3", bump("q", 500, 3, 2e-6), "fr3-jerk", "fr3_joint4", None),
-    ("franka-fr3", shifted(1, 1.79181), "fr3-position", "fr3_joint2", 1001),
+    ("franka-fr3", late(200, 3e-4), "fr3-period", None, 201),
+    ("franka-fr3", bump("q", 250, 3, 2e-6), "fr3-jerk", "fr3_joint4", None),
+    ("franka-fr3", shifted(1, 1.79181), "fr3-position", "fr3_joint2", 501),
     ("franka-fr3", bump("qd", 0, 2, 0.01), "fr3-rest-start", "fr3_joint3", 1),
-    ("franka-fr3", bump("qdd", -1, 2, 0.01), "fr3-rest-end", "fr3_joint3", 1001),
-    ("franka-fr3", step(300, 5, 0.0045), "fr3-velocity", "fr3_joint6", 301),
-    ("franka-fer", late(400, 3e-4), "fer-period", None, 401),
-    ("franka-fer", bump("q", 500, 1, 1.5e-6), "fer-jerk", "panda_joint2", None),
-    ("franka-fer", shifted(3, -0.06979), "fer-position", "panda_joint4", 1001),
-    ("franka-fer", step(300, 5, 0.003), "fer-velocity", "panda_joint6", 301),
+    ("franka-fr3", bump("qdd", -1, 2, 0.01), "fr3-rest-end", "fr3_joint3", 501),
+    ("franka-fr3", step(150, 5, 0.0045), "fr3-velocity", "fr3_joint6", 151),
+    ("franka-fer", late(200, 3e-4), "fer-period", None, 201),
+    ("franka-fer", bump("q", 250, 1, 1.5e-6), "fer-jerk", "panda_joint2", None),
+    ("franka-fer", shifted(3, -0.06979), "fer-position", "panda_joint4", 501),
+    ("franka-fer", step(150, 5, 0.003), "fer-velocity", "panda_joint6", 151),
     ("ur-servoj", late(100, 1e-3), "servoj-period", None, 101),
     ("ur-servoj", step(200, 4, 0.041), "servoj-step", "wrist_2_joint", 201),
     ("ur-servoj", step(200, 4, 0.0135), "servoj-speed", "wrist_2_joint", 201),

@@ -205,7 +205,7 @@ def job(kind: str) -> dict[str, Any]:
                     }
                 ],
             )
-            for kind, corners in (("merged", (420, 420)), ("turns_back", (440, 420)))
+            for kind, corners in (("turns_back", (440, 420)),)
         },
         "shrunk": (
             TWO,

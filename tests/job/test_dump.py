@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from planned_examples import planned_example
 from random_mappings import jobs
-from tiers import few
+from tiers import QUICK, few
 
 from trajcli.errors import InputError
 from trajcli.job.dump import dump_job, dump_robot, mapping_text
@@ -21,7 +21,8 @@ from trajcli.planners.planner import Planner
 from trajcli.planning.plan import plan_job
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.yaml"))
-PLANNED = few([path for path in EXAMPLES if "zone: " not in path.read_text()], 8)  # corners take seconds each
+QUICK_ONES = [path for path in EXAMPLES if "zone: " not in path.read_text()]  # corners take seconds each
+PLANNED = {*few(QUICK_ONES, 8)} - {path for path in EXAMPLES if QUICK and path.stem == "time_optimal_jerk"}
 
 
 def fields_of(move: Planner) -> tuple[Any, ...]:
