@@ -241,3 +241,16 @@ def test_a_piece_of_a_short_time_is_one_with_a_speed_of_its_own(length: float) -
     found = tool_bounds(arm(), np.array([0.0, 0.1, 0.1 + length, 0.2]), rows)
     assert [found[0].upper_bound, found[1].upper_bound] == pytest.approx([LEVER * 40.0, 40.0], rel=1e-6)
     assert found[0].time == pytest.approx(0.1, abs=2 * length)
+
+
+def test_a_part_of_a_curve_and_another_arm_on_it_have_rates_of_their_own() -> None:
+    """Asked for one after the other, from the same start on."""
+    curve, robot = turning(0.1, 2.0), arm(speed=9.0)
+    rest = State(*(np.zeros(2) for _ in range(3)))
+    longer = replace(robot, joints=(replace(robot.joints[0], a=2 * LEVER), robot.joints[1]))
+    for one, end, speed in ((robot, 2.0, 2.0), (robot, 1.0, 0.1), (longer, 1.0, 0.2), (robot, 2.0, 2.0)):
+        span = Span(0, "trapezoid", 0.0, end, 1)
+        trajectory = Trajectory(curve, one.joint_names, one.joint_types, (span,), rest, rest)
+        survey = FAMILY.survey(LimitedMove(trajectory, span, one.limits, one))
+        assert survey is not None
+        assert survey.peaks["speed"].upper_bound == pytest.approx(LEVER * speed, rel=1e-6)

@@ -144,9 +144,16 @@ def by_ruckig(way: float, first: tuple[float, float], last: tuple[float, float],
     return float(found.duration)
 
 
-@pytest.mark.parametrize(("jerk", "near"), [(4.0, 0.64), (30.0, 0.94)])
-@pytest.mark.parametrize("moving", few([(0.0, 0.0), (0.0, 2.9), (0.5, 0.0), (0.5, 2.0), (1.2, -1.0)], 2))
-@pytest.mark.parametrize("at_end", [False, True])
+@pytest.mark.parametrize(
+    ("jerk", "near", "moving", "at_end"),
+    [
+        (*limit, moving, (k + j) % 2 == 1)
+        for k, moving in enumerate(
+            few([(0.0, 0.0), (0.0, 2.9), (0.5, 0.0), (0.5, 2.0), (1.2, -1.0), (0.3, 1.0)], 3)
+        )
+        for j, limit in enumerate([(4.0, 0.64), (30.0, 0.94)])
+    ],
+)
 def test_with_jerk_it_is_not_above_the_motion_of_ruckig(
     moving: tuple[float, float], jerk: float, near: float, *, at_end: bool
 ) -> None:

@@ -53,7 +53,6 @@ def trapezoid(length: float, speed: float, acceleration: float) -> float:
         ({}, {}, V, A),
         ({}, {"speed": 0.5}, 0.5, A),
         ({}, {"acceleration": 3.0}, V, 3.0),
-        ({"speed": 0.5}, {}, 0.5, A),
         ({"speed": 0.5}, {"speed": 1.0}, 0.5, A),
         ({"acceleration": 1.5}, {"acceleration": 3.0, "speed": 0.7}, 0.7, 1.5),
         ({"speed": 0.5, "acceleration": 1.5}, {}, 0.5, 1.5),

@@ -267,8 +267,10 @@ def test_two_derivatives_are_promised_where_the_rule_imposes_both_at_its_ends(ru
     assert made.moves[0].continuity == (2 if rule in ("continuous_acceleration", "quintic") else 1)
 
 
-@pytest.mark.parametrize(("first", "last"), [(0.0, 0.5), (0.5, 0.0), (0.0, -0.5), (0.5, 0.25)])
-@pytest.mark.parametrize("duration", [None, 2.0])
+@pytest.mark.parametrize(
+    ("first", "last", "duration"),
+    [(0.0, 0.5, None), (0.5, 0.0, None), (0.0, -0.5, 2.0), (0.5, 0.0, 2.0), (0.5, 0.25, None)],
+)
 def test_an_arm_that_returns_to_its_place_with_another_velocity_moves(
     first: float, last: float, duration: float | None
 ) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, distinct
+from trajcli.curves.piecewise import Array, Side, distinct
 from trajcli.frozen import comparable
 
 if TYPE_CHECKING:
@@ -65,8 +65,9 @@ def path_derivatives(path: ToolPath) -> PathDerivatives:
 
 
 def _derivatives(path: ToolPath, s: Array) -> Array:
-    """Return X' and X'' at s (N,) from both sides, (2, 2, N, 6)."""
-    return np.stack([path.poses.evaluate(s, side)[1:] for side in ("left", "right")], axis=1)
+    """Return X' and X'' at s (N,), (2, k, N, 6): from both sides, or from one where they are the same."""
+    sides: tuple[Side, ...] = ("left", "right") if path.breaks.size > 2 else ("right",)
+    return np.stack([path.poses.evaluate(s, side)[1:] for side in sides], axis=1)
 
 
 def largest(sizes: Callable[[Array], Array], s: Array) -> Array:
