@@ -192,6 +192,18 @@ def test_a_move_without_a_path_has_no_distance_along_one(moves: list[int], part:
     )
 
 
+@pytest.mark.parametrize("moves", [[0, 1], [1, 0]])
+def test_a_path_ends_where_another_move_begins_whichever_number_that_has(moves: list[int]) -> None:
+    """Of two moves in one block of rows the first one has a path, and the second one none."""
+    q, s = driven(2)
+    s[COUNT:] = 0.0
+    s[COUNT + 10, 0] = 1e-3
+    paths = {moves[0]: plan().moves[0].planned.tool, moves[1]: None}
+    arms = ArmsOfMoves(plan().moves[0].robot, [])
+    found = judged(arms, q, "s sd sdd", s, np.repeat(moves, COUNT), paths=paths)
+    assert [(each.quantity, each.move, each.row) for each in found] == [("position", moves[1], COUNT + 11)]
+
+
 @pytest.mark.parametrize("to", [2e-3, -2e-3])
 @pytest.mark.parametrize("move", [0, 1])
 def test_a_distance_that_jumps_is_found(move: int, to: float) -> None:

@@ -29,7 +29,7 @@ def random_plan(profile: str, seed: int) -> trajcli.Plan:
     robot = trajcli.load_robot(setting["robot"])
     low, high = np.clip(robot.limits.position, -2.5, 2.5).T
     middle, half = (low + high) / 2, 0.6 * (high - low) / 2
-    states = [(middle + half * rng.uniform(-1, 1, low.size)).tolist() for _ in range(4)]
+    states = [(middle + 0.3 * half * rng.uniform(-1, 1, low.size)).tolist() for _ in range(4)]
     limits: dict[str, Any] = {"scale": {"velocity": 0.97, "acceleration": 0.99, "jerk": 0.99}}
     if setting["robot"] == "ur5e":
         limits = {"acceleration": 5, "jerk": 50}
