@@ -12,6 +12,25 @@ from trajcli.samples import sample
 SAMPLES = 41  # of an interval
 
 
+def control_points(rows: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Return Bernstein coefficients (k, intervals, n) of what shares the derivatives (N, orders, n) of rows.
+
+    Source: Farouki (2012), section 5, what `BPoly.from_derivatives` solves interval by interval.
+    """
+    orders = rows.shape[1]
+    degree, h = 2 * orders - 1, lengths[:, None]
+    ends = []
+    for values, step in ((rows[:-1], h), (rows[1:], -h)):
+        points = [values[:, 0]]
+        if orders > 1:
+            points.append(values[:, 0] + step / degree * values[:, 1])
+        if orders > 2:
+            bend = step**2 / (degree * (degree - 1)) * values[:, 2]
+            points.append(2 * points[1] - points[0] + bend)
+        ends.append(points)
+    return np.stack([*ends[0], *ends[1][::-1]])
+
+
 def largest_share(plan: Plan, grid: Grid, shortest: float) -> float:
     """Return the largest share of a limit that Hermite curves through all rows use, by dense samples.
 
@@ -24,8 +43,8 @@ def largest_share(plan: Plan, grid: Grid, shortest: float) -> float:
     joints = len(plan.trajectory.joint_names)
     rows = np.concatenate([*sample(plan.trajectory, grid, groups)]).reshape(grid.count, len(groups), joints)
     t = np.concatenate([local for _, local in grid.blocks()])
-    curve, worst = BPoly.from_derivatives(t, rows), 0.0
     lengths = np.diff(t)
+    curve, worst = BPoly(control_points(rows, lengths), t), 0.0
     times = t[:-1, None] + lengths[:, None] * np.linspace(1e-9, 1 - 1e-9, SAMPLES)
     times = times[lengths > shortest].ravel()
     owner = np.searchsorted([span.start for span in plan.trajectory.spans], times, "right") - 1

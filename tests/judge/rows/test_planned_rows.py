@@ -27,7 +27,7 @@ def judged(plan: Plan, file: Path) -> Judgement:
     return check_file(str(file), CheckOptions(), plan).judgement
 
 
-@pytest.mark.parametrize("name", ["cubic", "recorded", "screw", "sync", "ur5e_pose_columns", "waypoints"])
+@pytest.mark.parametrize("name", ["cubic", "recorded", "screw", "sync", "ur5e_pose_columns", "blends"])
 def test_examples_are_known_by_their_rows(name: str, tmp_path: Path) -> None:
     plan, file = planned(EXAMPLES / f"{name}.yaml"), tmp_path / "rows.csv"
     write_plan(plan, str(file))
