@@ -58,6 +58,7 @@ DEEDS = {
     "killed": killed,
     "exit": lambda: os._exit(5),
     "gone": lambda: os._exit(0),
+    "asked to end": lambda: os.kill(os.getpid(), signal.SIGTERM),
     "endless": endless,
     "stubborn": stubborn,
     "half_written": half_written,
@@ -119,6 +120,41 @@ def test_a_process_that_ends_without_a_word_has_crashed() -> None:
     gone = outcomes("gone")["gone"]
     assert (gone.outcome, gone.exit_code) == ("crashed", 70)
     assert gone.problems[0].message == "the process that planned it ended with exit code 0"
+
+
+def test_a_process_that_somebody_asks_to_end_says_so_by_its_code() -> None:
+    """A shell says 128 + 15 of a program that SIGTERM has ended."""
+    (problem,) = outcomes("asked to end")["asked to end"].problems
+    assert problem.message == "the process that planned it ended with exit code 143"
+
+
+def lives(process: int) -> bool:
+    """Return whether a process goes on; one that has ended waits for whoever asks for its exit code."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_processes_end_with_the_one_that_began_them() -> None:
+    first = os.fork()
+    if first == 0:
+        for _ in run_in_processes([Task(BatchJob("endless", "x.csv"), None)], SETUP, 1, None):
+            pass
+        os._exit(0)
+    children, until = Path(f"/proc/{first}/task/{first}/children"), time.monotonic() + 10
+    while not children.read_text():
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    (worker,) = map(int, children.read_text().split())
+    os.kill(first, signal.SIGKILL)
+    os.waitpid(first, 0)
+    until = time.monotonic() + 5
+    while (left := lives(worker)) and time.monotonic() < until:
+        time.sleep(0.005)
+    if left:
+        os.kill(worker, signal.SIGKILL)
+    assert not left
 
 
 def test_a_process_without_memory_is_replaced() -> None:
