@@ -6,7 +6,7 @@ import ast
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple, TypeVar
 
@@ -55,10 +55,16 @@ class Sources:
         self.texts = dict(sorted(texts.items()))
         self.test_folders = sorted(test_folders)
         self.trees = {path: ast.parse(text, path) for path, text in self.texts.items()}
-        self.kinds = {path: _by_type(tree) for path, tree in self.trees.items()}
         self.modules = {path: module_name(path) for path in self.texts}
         self.paths = {module: path for path, module in self.modules.items()}
-        self.imports = {path: list(self._imports(path, tree, "start")) for path, tree in self.trees.items()}
+
+    @cached_property
+    def kinds(self) -> dict[str, dict[type[ast.AST], list[ast.AST]]]:
+        return {path: _by_type(tree) for path, tree in self.trees.items()}
+
+    @cached_property
+    def imports(self) -> dict[str, list[Import]]:
+        return {path: list(self._imports(path, tree, "start")) for path, tree in self.trees.items()}
 
     @property
     def folders(self) -> set[str]:
