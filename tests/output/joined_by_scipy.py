@@ -25,8 +25,8 @@ def control_points(rows: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         if orders > 1:
             points.append(values[:, 0] + step / degree * values[:, 1])
         if orders > 2:
-            bend = step**2 / (degree * (degree - 1)) * values[:, 2]
-            points.append(2 * points[1] - points[0] + bend)
+            change = 2 * step / degree * values[:, 1] + step**2 / (degree * (degree - 1)) * values[:, 2]
+            points.append(values[:, 0] + change)
         ends.append(points)
     return np.stack([*ends[0], *ends[1][::-1]])
 
