@@ -180,9 +180,12 @@ JOB_ON_PATH = {"version": 1, "robot": "ur5e", "limits": {"acceleration": 20}, "s
     ("shape", "key"),
     few(
         [
-            (shape, key)
-            for keys in (THIRD, reversed(THIRD))
-            for shape, key in zip(["quintic", "jerk_limited", "time_optimal"], [*keys, "jerk"], strict=True)
+            ("quintic", "jerk"),
+            ("quintic", "angular_jerk"),
+            ("jerk_limited", "angular_jerk"),
+            ("jerk_limited", "jerk"),
+            ("time_optimal", "jerk"),
+            ("time_optimal", "angular_jerk"),
         ],
         3,
     ),

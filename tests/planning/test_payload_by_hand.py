@@ -86,7 +86,7 @@ def _counted(job: str, at: int | None = None) -> tuple[PayloadCapacity, int]:
 
 @pytest.mark.parametrize(
     ("job", "most"),
-    few([(CARRYING, 6), (CARRYING.replace("b: [-40, 30]", "b: [-15, 30]"), 6), (FREE, 12)], 2),
+    few([(CARRYING, 6), (CARRYING.replace("b: [-40, 30]", "b: [-15, 30]"), 6), (FREE, 12)], 1),
 )
 def test_few_masses_are_tried_and_the_next_larger_one_fails(job: str, most: int) -> None:
     """Where the motion is given its rows say which mass; else each has its own, and a line leads there."""
