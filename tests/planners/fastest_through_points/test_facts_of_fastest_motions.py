@@ -60,7 +60,7 @@ def test_one_joint_that_goes_on_is_as_fast_as_its_bound_and_passes_its_points(
 ) -> None:
     points = sign * np.array([0.0, 0.1, 0.5, 0.55, 1.3])
     made = problem(points, slower)
-    found = fastest_motion(made, NAMES[: made.joints], 4)
+    found = fastest_motion(made, NAMES[: made.joints], 2)
     whole = from_rest(0.0, sign * 1.3, slower)
     assert found.motion.duration == pytest.approx(whole, rel=1e-6)
     assert found.lower == pytest.approx(whole, rel=1e-6)
@@ -74,7 +74,7 @@ def test_one_joint_that_goes_on_is_as_fast_as_its_bound_and_passes_its_points(
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_points_before_and_behind_a_turn_are_passed_in_their_order(sign: float) -> None:
     made = problem(sign * np.array([0.0, 0.3, 0.8, 0.6, 0.1]))
-    found = fastest_motion(made, NAMES[: made.joints], 4)
+    found = fastest_motion(made, NAMES[: made.joints], 2)
     keeps(made, found)
     assert found.lower <= found.motion.duration * (1 + 1e-9)
     assert found.motion.duration < 0.9 * found.stopping
@@ -83,7 +83,7 @@ def test_points_before_and_behind_a_turn_are_passed_in_their_order(sign: float) 
 @pytest.mark.parametrize(("order", "value"), [(0, 0.2), (1, -0.7)])
 def test_what_is_given_at_a_point_where_one_joint_goes_on_is_kept(order: int, value: float) -> None:
     made = given(problem([0.0, 0.5, 1.3]), 1, order, value)
-    found = fastest_motion(made, NAMES[: made.joints], 4)
+    found = fastest_motion(made, NAMES[: made.joints], 2)
     keeps(made, found)
     at = found.motion.curve.evaluate(found.motion.times[1:2], order + 1)
     assert float(at[0, 0]) == pytest.approx(value, abs=1e-8)
@@ -95,7 +95,7 @@ def test_a_segment_of_one_joint_lasts_as_long_as_it_is_told(segment: int) -> Non
     least = np.zeros(3)
     least[segment] = 2.0
     made = replace(problem([0.0, 0.4, 0.9, 1.3]), least=least)
-    found = fastest_motion(made, NAMES[: made.joints], 4)
+    found = fastest_motion(made, NAMES[: made.joints], 2)
     keeps(made, found)
     assert np.diff(found.motion.times)[segment] >= 2.0 * (1 - 1e-9)
     assert found.motion.duration < 2.0 + from_rest(0.0, 1.3)
@@ -144,7 +144,7 @@ def test_a_straight_line_is_left_where_more_is_asked_for(what: str) -> None:
         made = given(made, 1, 0, 0.1 if what == "between" else 0.0)
     else:
         made = replace(made, least=np.array([0.0, 1.5]))
-    found = fastest_motion(made, NAMES[: made.joints], 2)
+    found = fastest_motion(made, NAMES[: made.joints], 1)
     keeps(made, found)
     velocity = found.motion.curve.evaluate(found.motion.times, 1)
     if what == "start":
@@ -163,7 +163,7 @@ def test_walls_on_either_side_are_kept(sign: float) -> None:
     (peak,) = peaks(fastest_motion(free, NAMES, 1).motion.curve, (0,))
     assert (peak.high > high).any() or (peak.low < low).any()
     made = replace(free, position=np.stack([low, high], axis=1))
-    found = fastest_motion(made, NAMES[: made.joints], 2)
+    found = fastest_motion(made, NAMES[: made.joints], 1)
     keeps(made, found)
     assert found.motion.duration < found.stopping
 
@@ -178,7 +178,7 @@ def test_the_joint_that_passes_a_limit_in_vain_is_named_with_what_it_reaches(joi
     walls[joint] = sorted([-3.0 * sign, 1.02 * sign])
     made = replace(made, position=walls)
     with pytest.raises(PlanningError) as caught:
-        fastest_motion(made, NAMES[: made.joints], 2)
+        fastest_motion(made, NAMES[: made.joints], 1)
     (refusal,) = caught.value.problems
     assert refusal.joint == NAMES[joint]
     assert "keeps the position limits" in refusal.message
@@ -249,7 +249,7 @@ def test_states_of_a_motion_that_leaves_position_limits_are_lowered_until_it_doe
 def test_with_time_to_spare_a_straight_motion_takes_no_run_up_beyond_its_ends(sign: float) -> None:
     made = problem(sign * np.array([[0, 0], [0.2, 0.3], [0.9, 1.35]]), joints=2)
     made = replace(made, least=np.array([3.0, 0.0]))
-    found = straight_only(made, NAMES, 4)
+    found = straight_only(made, NAMES, 1)
     keeps(made, found)
     (peak,) = peaks(found.motion.curve, (0,))
     ends = np.sort(made.points[[0, -1]], axis=0)

@@ -80,7 +80,7 @@ def fastest(rule, q, guess, down=VELOCITY):
     def times(y):
         return np.concatenate([[0.0], np.cumsum(np.exp(y))])
 
-    for k in range(STARTS):
+    for k in few(range(STARTS), 3):
         found = minimize(
             lambda y: np.exp(y).sum(),
             np.log(guess) + (k > 0) * rng.normal(0, 0.4, guess.size),
