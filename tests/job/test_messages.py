@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ TO = "{joints: [10, 10, 10, 10]}"
 DURATION = "duration: 2"
 
 
+@cache
 def problems_of(text: str) -> list[Problem]:
     with pytest.raises(InputError) as caught:
         job_from_text(text, "job.yaml")
