@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from planning.test_payload_capacity import CARRYING, EMPTY, FREE, HEAD, LAST, verifies
+from planning.test_payload_capacity import CARRYING, EMPTY, FREE, HEAD, LAST, WHOLE, verifies
 from tiers import few
 
 from trajcli.cli.job_commands import PayloadCommand
@@ -86,7 +86,7 @@ def _counted(job: str, at: int | None = None) -> tuple[PayloadCapacity, int]:
 
 @pytest.mark.parametrize(
     ("job", "most"),
-    few([(CARRYING, 6), (CARRYING.replace("b: [-40, 30]", "b: [-15, 30]"), 6), (FREE, 12)], 1),
+    few([(CARRYING, 6), (FREE, 12), (CARRYING.replace("b: [-40, 30]", "b: [-15, 30]"), 6)], 2),
 )
 def test_few_masses_are_tried_and_the_next_larger_one_fails(job: str, most: int) -> None:
     """Where the motion is given its rows say which mass; else each has its own, and a line leads there."""
@@ -96,6 +96,14 @@ def test_few_masses_are_tried_and_the_next_larger_one_fails(job: str, most: int)
     largest = float(found.mass or 0)
     assert verifies(job, largest)
     assert not verifies(job, largest * (1 + 1e-6))
+
+
+def test_of_several_moves_that_carry_it_the_one_that_takes_most_binds() -> None:
+    """Of motions that are given; it is not the last one."""
+    found = payload_capacity(job_from_text(EMPTY))
+    assert (found.move, found.moves) == (0, (0, 1, 2))
+    assert verifies(WHOLE, float(found.mass or 0))
+    assert not verifies(WHOLE, float(found.mass or 0) * (1 + 1e-6))
 
 
 def test_of_several_payloads_the_one_that_is_meant() -> None:

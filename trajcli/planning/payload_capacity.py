@@ -218,7 +218,7 @@ class _Search:
             for allowed in _ALLOWED:
                 root = 0.0 if x == y else high - (x - allowed) * (further - high) / (y - x)
                 lower, upper = root * (1 - beside), root * (1 + beside)
-                if low < root < high:
+                if low * (1 - _CLOSE / 8) < root < high:
                     middle = lower if lower > low else upper if upper < high else middle
                     beside *= 4
                     break
