@@ -151,7 +151,18 @@ def test_chunks_with_time_follow_each_other(tmp_path: Path) -> None:
 
 def test_what_is_no_archive_of_arrays_is_one_error(tmp_path: Path) -> None:
     whole = path_of(tmp_path, "named.npz", np.zeros((8, 2))).read_bytes()
-    for number, text in enumerate((whole[:50], whole[:-30], whole.replace(b"NUMPY", b"NUMPI"), b"")):
+    kind = whole.rindex(b"PK\x01\x02") + 10  # how its last member is compressed, in the directory at the end
+    packed_otherwise = [whole[:kind] + bytes([other]) + whole[kind + 1 :] for other in (1, 12, 14, 99)]
+    cut_inside = [whole[:20] + whole[20 + count :] for count in (1, 100)]
+    damaged = (
+        whole[:50],
+        whole[:-30],
+        whole.replace(b"NUMPY", b"NUMPI"),
+        b"",
+        *cut_inside,
+        *packed_otherwise,
+    )
+    for number, text in enumerate(damaged):
         file = tmp_path / f"{number}.npz"
         file.write_bytes(text)
         with pytest.raises(InputError, match="archive"):

@@ -221,6 +221,7 @@ def _rows_of(
 
 def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
     """Return the arrays of real numbers in an archive, by their names."""
+    import struct
     import tokenize
     import zipfile
     import zlib
@@ -228,7 +229,7 @@ def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
     from numpy.lib import format as npy
 
     found: dict[str, NDArray[Any]] = {}
-    wrong = (ValueError, zipfile.BadZipFile, EOFError, RuntimeError, tokenize.TokenError)
+    wrong = (ValueError, zipfile.BadZipFile, EOFError, RuntimeError, tokenize.TokenError, struct.error)
     try:
         with source.open() as stream, zipfile.ZipFile(stream) as archive:
             members = [member for member in archive.infolist() if member.filename.endswith(".npy")]
@@ -236,6 +237,8 @@ def _arrays_of(source: ByteSource) -> dict[str, NDArray[Any]]:
             if size > _LARGEST_ARCHIVE:
                 raise InputError(f"{source.file} holds {size} bytes", hint="save one array of it as .npy")
             for member in members:
+                if member.header_offset < 0 or member.compress_type not in (0, 8):  # stored, deflated
+                    raise zipfile.BadZipFile(f"{member.filename} is not where or as it should be")
                 with archive.open(member) as content:
                     array = npy.read_array(content, allow_pickle=False)
                 if array.dtype.kind in "fiu" and array.ndim:
