@@ -71,6 +71,7 @@ def test_rows_that_their_consumer_refuses(
     assert code == 1
     assert f"error: {rule}: " in err
     assert "slower motion" not in err, "none has other joints"
+    assert "`trajcli profiles` lists other consumers" in err
     assert not target.exists()
 
 

@@ -77,7 +77,7 @@ class JointCount(_OfFirstRow):
         if count != wanted:
             text = f"the rows have {count} joint{'s' * (count != 1)}, and {wanted} are moved"
             fields = {"kind": "position", "value": float(count), "limit": float(wanted), "message": text}
-            self.note(rows, None, 0, 1.0, fields)
+            self.note(rows, None, 0, 1.0, {**fields, "hint": "`trajcli profiles` lists other consumers"})
 
 
 class CompletePoints(RuleCheck):
