@@ -10,7 +10,17 @@ import pytest
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import InputError
 from trajcli.kinematics.robot import Joint, MountedTool, Payload, Robot, unlimited
-from trajcli.trajectory import Signal, SignalChange, Span, State, Trajectory, ViaPoints, move_title, resting
+from trajcli.trajectory import (
+    Rows,
+    Signal,
+    SignalChange,
+    Span,
+    State,
+    Trajectory,
+    ViaPoints,
+    move_title,
+    resting,
+)
 
 # q = t^2 up to 1 s, then 1 + 3 (t - 1) + ...: velocity steps from 2 to 3
 CURVE = PiecewisePolynomial(
@@ -30,9 +40,19 @@ def test_rest_is_without_velocity_and_acceleration() -> None:
         assert State(np.ones(1), np.array([velocity]), np.array([acceleration])).at_rest == rests
 
 
+def test_states_are_told_apart_by_each_of_their_derivatives() -> None:
+    one, other = np.array([1.0]), np.array([2.0])
+    states = [State(one, one, one), State(other, one, one), State(one, other, one), State(one, one, other)]
+    assert len({state.bits for state in states}) == 4
+    assert states[0].bits == State(one.copy(), one, one).bits
+    rest = resting(other)
+    assert (rest.position.tolist(), rest.velocity.tolist(), rest.acceleration.tolist()) == ([2], [0], [0])
+
+
 def test_points_of_a_slower_motion_are_passed_later() -> None:
-    points = ViaPoints(np.array([0.0, 1.0]), np.ones((2, 1)), np.zeros((2, 1))).scaled(2.5)
+    points = ViaPoints(np.array([0.0, 1.0]), np.ones((2, 1)), np.full((2, 1), 0.5)).scaled(2.5)
     assert points.times.tolist() == [0.0, 2.5]
+    assert (points.points.tolist(), points.missed.tolist()) == ([[1], [1]], [[0.5], [0.5]])
 
 
 @pytest.mark.parametrize("start", [0.0, 7.0, -4.0])
@@ -48,18 +68,37 @@ def test_calls_count_from_the_time_of_the_start_and_end_within_rounding(start: f
     for late in (-2e-9, 3 + 2e-9, np.nan):
         with pytest.raises(InputError, match="outside the trajectory"):
             trajectory(start + late)
+    with pytest.raises(InputError, match=f"the time {start + 3.5:g} s lies outside") as caught:
+        trajectory([start + 1.0, start + 3.5, start - 9.0])
+    assert f"it lasts from {start:g} s to {start + 3:g} s" in str(caught.value.problems[0].hint)
+    with pytest.raises(InputError):
+        trajectory("soon")  # type: ignore[arg-type]
     for order in (True, -1, 1.0):
         with pytest.raises(InputError, match="the order of the derivative"):
             trajectory(start, order)  # type: ignore[arg-type]
     rows = trajectory.sample(1.0)
     assert rows.t.tolist() == [start, start + 1, start + 2, start + 3]
     assert rows.qd[:, 0].tolist() == [0, 3, 4, 5]
+    assert rows.qdd[:, 0].tolist() == [2, 1, 1, 1]
+    assert len(rows) == 4
+
+
+def test_rows_say_how_many_they_are_and_of_how_many_joints() -> None:
+    rows = Rows(np.array([0.5, 1.0, 1.5]), *np.zeros((3, 3, 2)))
+    assert (len(rows), repr(rows)) == (3, "Rows(3 rows, 2 joints, 0.5 s to 1.5 s)")
+    assert repr(Rows(np.zeros(0), *np.zeros((3, 0, 2)))) == "Rows(0 rows, 2 joints)"
+
+
+def test_rows_at_a_break_but_for_rounding_are_those_of_the_later_piece() -> None:
+    curve = PiecewisePolynomial(np.array([0.0, np.nextafter(1.0, 2.0), 3.0]), CURVE.coefficients)
+    rows = replace(made(), curve=curve).sample(1.0)
+    assert rows.qd[:, 0] == pytest.approx([0, 3, 4, 5], abs=1e-12)
 
 
 def test_before_a_break_the_earlier_piece_counts() -> None:
     trajectory = made()
-    times = np.array([1.0, 1.0 + 2e-16, 0.5, 3.0, 3.5])
-    np.testing.assert_allclose(trajectory.before(times, 1)[:, 0], [2, 2, 1, 5, 5], atol=1e-12)
+    times = np.array([1.0, 1.0 + 2e-16, 0.5, 3.0, 3.5, 1.0 + 7e-16, 1.0 + 1e-13, 0.0])
+    np.testing.assert_allclose(trajectory.before(times, 1)[:, 0], [2, 2, 1, 5, 5, 2, 3, 0], atol=1e-12)
 
 
 def test_a_move_of_no_length_holds_no_time() -> None:
@@ -68,6 +107,8 @@ def test_a_move_of_no_length_holds_no_time() -> None:
     trajectory = made(*spans)
     assert [trajectory.span_at(time).index for time in (0.0, 0.9, 1.0, 3.0)] == [0, 0, 2, 2]
     assert repr(trajectory) == "Trajectory(1 joint, 2 moves, 3 s)"
+    assert repr(made(spans[0], still[0])) == "Trajectory(1 joint, 1 move, 3 s)"
+    assert made(*still).span_at(9.0).index == 1
 
 
 @pytest.mark.parametrize(
@@ -75,7 +116,7 @@ def test_a_move_of_no_length_holds_no_time() -> None:
     [("pick -> place", "pick", "place"), ("a -> b -> c", "a", "c"), ("-> place", "", "place"), ("", "", "")],
 )
 def test_names_of_a_move(ends: str, origin: str, goal: str) -> None:
-    span = Span(0, "line", 0.0, 1.0, 1, label="", round="slot 2 of 3", ends=ends)
+    span = Span(0, "line", 2.0, 3.0, 1, label="", round="slot 2 of 3", ends=ends)
     assert (span.origin, span.goal, span.duration) == (origin, goal, 1.0)
     assert span.title == (f"{ends} (line, slot 2 of 3)" if ends else "line, slot 2 of 3")
     assert replace(span, label="weld").title == "weld (line, slot 2 of 3)"
@@ -123,3 +164,21 @@ def test_a_trajectory_of_no_duration_has_the_tool_of_its_first_move() -> None:
     spans = (Span(0, "a", 0.0, 0.0, 1, tool=tool), Span(1, "b", 0.0, 0.0, 1))
     found = made(*spans).of_tools(ARM, np.zeros(2), lambda arm, rows: np.full(rows.size, arm is ARM))
     assert found.tolist() == [0, 0]
+
+
+def test_a_tool_that_is_changed_when_all_is_done_counts_for_no_time() -> None:
+    """Nor does the last tool count for a time before the start, by what rounding leaves."""
+    long = np.eye(4)
+    long[0, 3] = 0.5
+    load = Payload(2.0, np.zeros(3), np.zeros((3, 3)))
+    spans = (
+        Span(0, "a", 0.0, 1.0, 1),
+        Span(1, "b", 1.0, 3.0, 1, tool=MountedTool(long, name="long"), payload=load),
+        Span(2, "tool", 3.0, 3.0, 1, tool=MountedTool(np.diag([1.0, -1.0, -1.0, 1.0])), handles=True),
+    )
+    times = np.array([3.0, -1e-10, 1.5])
+    found = made(*spans).of_tools(ARM, times, lambda arm, rows: arm.tool[0, 3] + 10 * arm.tool[1, 1] + 0 * rows)
+    assert found.tolist() == [10.5, 10.0, 10.5]
+    arm = spans[1].arm(ARM)
+    assert arm.payload is load
+    assert arm.tool[0, 3] == 0.5

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from inverse_arms import arm, gap, random_joints
+from inverse_arms import FAMILIES, arm, gap, random_joints
 from scipy.spatial.transform import Rotation
 
 from trajcli.kinematics.forward import forward
@@ -91,3 +93,38 @@ def test_two_parallel_turns_meet_their_aim_also_where_the_second_is_free(same, b
             reached = turning(two, second[answer, i]) @ turning(three, third[answer, i]) @ tip
             assert reached == pytest.approx(aim, abs=3e-15 if beyond_elbow > 1e-8 else 3.0 * beyond_elbow)
     assert flags.rows.all() == (beyond_elbow < 1e-8)
+
+
+@pytest.mark.parametrize("zero", ["0", ".3", "1", "2"])
+@pytest.mark.parametrize(("first", "slant"), [(".4", ".8"), ("0", "1"), ("1", "1")])
+def test_first_and_last_axis_of_a_wrist_in_line_share_one_turn_wherever_joint_5_is_zero(
+    monkeypatch: pytest.MonkeyPatch, first: str, slant: str, zero: str
+) -> None:
+    """Forward kinematics says what the sum of their turns is: a part that each of them may have."""
+    wrist = [f"R {first} .4 0 -{slant}", f"R {zero} 0 0 {slant}", "R .7 .1 .02 0"]
+    monkeypatch.setitem(FAMILIES, "line", ([*FAMILIES["wrist over elbow"][0][:3], *wrist], 8, "spherical wrist"))
+    robot = arm("line")
+    joints = random_joints(robot, np.random.default_rng(11), 4)
+    joints[:, 4] = -0.5 * np.pi * float(zero)
+    poses = forward(robot, joints)
+    found = solve(robot, poses, np.zeros((4, 6)))
+    assert found.valid.any(axis=1).all()
+    np.testing.assert_allclose(
+        forward(robot, found.joints)[found.valid], np.repeat(poses, found.count, axis=0), rtol=0, atol=1e-8
+    )
+    apart = np.abs(np.exp(1j * found.joints[..., :3]) - np.exp(1j * joints[:, None, :3])).max(axis=-1)
+    assert np.where(found.singular, apart, 1.0).min(axis=1).max() < 1e-6
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e6])
+@pytest.mark.parametrize("name", ["elbow with offsets", "two axes that meet", "planar 3R", "wrist over elbow", "UR"])
+def test_a_similar_arm_of_another_size_has_the_same_answers(name: str, size: float) -> None:
+    robot, rng = arm(name), np.random.default_rng(12)
+    scaled = [replace(joint, a=size * joint.a, d=size * joint.d) for joint in robot.joints]
+    similar = replace(robot, joints=tuple(scaled))
+    poses = forward(robot, random_joints(robot, rng, 12))
+    larger = poses.copy()
+    larger[:, :3, 3] *= size
+    one, other = solve(robot, poses), solve(similar, larger)
+    assert other.valid[one.valid].all()
+    assert gap(robot, one.joints, other.joints)[one.valid].max() < 1e-6
