@@ -12,7 +12,10 @@ from trajcli.errors import InputError
 from trajcli.job.dump import dump_job
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.robot import Friction, MountedTool, Payload
+from trajcli.kinematics.zone import Zone
+from trajcli.language.numbers import ReadingContext
 from trajcli.language.signals import SignalAt
+from trajcli.language.zones import ZoneField
 
 DEG = math.pi / 180
 HEAD = "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\nstart: {joints: [0, -90, 90, 0, 90, 0]}\n"
@@ -162,6 +165,15 @@ def test_zones(written: str, position: float | None, orientation: float | None, 
         assert zone.position == (None if position is None else pytest.approx(position, rel=1e-15))
         assert zone.orientation == (None if orientation is None else pytest.approx(orientation, rel=1e-15))
         assert zone.joints == (None if expected is None else pytest.approx(expected, rel=1e-15))
+
+
+def test_a_zone_that_is_none_says_what_one_is_and_one_that_is_made_stays_itself() -> None:
+    for text, hint in (("here", "`zone: 20 mm` is a ball about the corner"), ("{radius: 3}", "it has position, ")):
+        with pytest.raises(InputError) as caught:
+            job(f"zone: {text}\n")
+        assert str(caught.value.problems[0].hint).startswith(hint)
+    zone = Zone(orientation=0.5)
+    assert ZoneField("").read(zone, ReadingContext()) is zone
 
 
 LINE = "planner: line, to: {from: here, offset: {xyz: [0, 0, 50]}}, law: {shape: quintic, duration: 2}"

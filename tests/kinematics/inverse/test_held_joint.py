@@ -129,6 +129,18 @@ def test_a_pose_at_the_edge_of_the_limits_is_met() -> None:
     assert found.within_limits.any(axis=1).all()
 
 
+def test_answers_outside_the_limits_are_given_only_where_there_is_no_other() -> None:
+    low, high = PANDA.limits.position.T
+    middle, half = (low + high) / 2, (high - low) / 4
+    robot = replace(PANDA, limits=replace(PANDA.limits, position=np.stack([middle - half, middle + half], 1)))
+    found = solve(robot, forward(robot, random_joints(robot, 8)), middle)
+    assert found.within_limits.any(axis=1).all()
+    assert (found.valid == found.within_limits).all()
+    beyond = solve(robot, forward(PANDA, middle + 1.7 * half), middle)
+    assert beyond.valid.any()
+    assert not beyond.within_limits.any()
+
+
 def test_a_pose_out_of_reach_has_no_answer_and_says_how_far_it_is() -> None:
     pose = forward(PANDA, READY)
     pose[:3, 3] = [1.5, 0.0, 0.333]
