@@ -177,7 +177,9 @@ def test_a_tool_that_is_changed_when_all_is_done_counts_for_no_time() -> None:
         Span(2, "tool", 3.0, 3.0, 1, tool=MountedTool(np.diag([1.0, -1.0, -1.0, 1.0])), handles=True),
     )
     times = np.array([3.0, -1e-10, 1.5])
-    found = made(*spans).of_tools(ARM, times, lambda arm, rows: arm.tool[0, 3] + 10 * arm.tool[1, 1] + 0 * rows)
+    found = made(*spans).of_tools(
+        ARM, times, lambda arm, rows: arm.tool[0, 3] + 10 * arm.tool[1, 1] + 0 * rows
+    )
     assert found.tolist() == [10.5, 10.0, 10.5]
     arm = spans[1].arm(ARM)
     assert arm.payload is load

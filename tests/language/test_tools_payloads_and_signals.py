@@ -168,7 +168,10 @@ def test_zones(written: str, position: float | None, orientation: float | None, 
 
 
 def test_a_zone_that_is_none_says_what_one_is_and_one_that_is_made_stays_itself() -> None:
-    for text, hint in (("here", "`zone: 20 mm` is a ball about the corner"), ("{radius: 3}", "it has position, ")):
+    for text, hint in (
+        ("here", "`zone: 20 mm` is a ball about the corner"),
+        ("{radius: 3}", "it has position, "),
+    ):
         with pytest.raises(InputError) as caught:
             job(f"zone: {text}\n")
         assert str(caught.value.problems[0].hint).startswith(hint)

@@ -102,7 +102,9 @@ def test_first_and_last_axis_of_a_wrist_in_line_share_one_turn_wherever_joint_5_
 ) -> None:
     """Forward kinematics says what the sum of their turns is: a part that each of them may have."""
     wrist = [f"R {first} .4 0 -{slant}", f"R {zero} 0 0 {slant}", "R .7 .1 .02 0"]
-    monkeypatch.setitem(FAMILIES, "line", ([*FAMILIES["wrist over elbow"][0][:3], *wrist], 8, "spherical wrist"))
+    monkeypatch.setitem(
+        FAMILIES, "line", ([*FAMILIES["wrist over elbow"][0][:3], *wrist], 8, "spherical wrist")
+    )
     robot = arm("line")
     joints = random_joints(robot, np.random.default_rng(11), 4)
     joints[:, 4] = -0.5 * np.pi * float(zero)
@@ -117,7 +119,9 @@ def test_first_and_last_axis_of_a_wrist_in_line_share_one_turn_wherever_joint_5_
 
 
 @pytest.mark.parametrize("size", [1e-9, 1e6])
-@pytest.mark.parametrize("name", ["elbow with offsets", "two axes that meet", "planar 3R", "wrist over elbow", "UR"])
+@pytest.mark.parametrize(
+    "name", ["elbow with offsets", "two axes that meet", "planar 3R", "wrist over elbow", "UR"]
+)
 def test_a_similar_arm_of_another_size_has_the_same_answers(name: str, size: float) -> None:
     robot, rng = arm(name), np.random.default_rng(12)
     scaled = [replace(joint, a=size * joint.a, d=size * joint.d) for joint in robot.joints]
