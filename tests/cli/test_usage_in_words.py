@@ -21,6 +21,31 @@ def test_a_command_of_another_name_in_any_case(word: str, capfd: Capture) -> Non
     assert f"No such command '{word}': here it is `trajcli plan JOB --no-output`." in " ".join(err.split())
 
 
+MEANT = {
+    "trajcli plan JOB": "run sample trajectory",
+    "trajcli pose STEP...": "rotation euler",
+    "trajcli fk": "forward forward-kinematics",
+    "trajcli ik": "inverse inverse-kinematics solve",
+    "trajcli robots": "ls catalogue",
+    "trajcli diff A B": "compare cmp",
+    "trajcli init": "new example",
+    "trajcli explain JOB": "describe info",
+    "trajcli plot JOB": "draw chart",
+    "trajcli view JOB -o view.html": "player html",
+    "trajcli plan JOB --report FILE": "report",
+    "trajcli --help": "help",
+    "trajcli --version": "version",
+    "trajcli --version --verbose": "doctor versions",
+}
+
+
+@pytest.mark.parametrize("command", MEANT)
+def test_what_others_call_a_command_leads_to_it(command: str, capfd: Capture) -> None:
+    for word in MEANT[command].split():
+        code, _, err = call(capfd, word)
+        assert (code, f"here it is `{command}`." in " ".join(err.split())) == (2, True), word
+
+
 @pytest.mark.parametrize(
     ("words", "form"),
     [
@@ -113,6 +138,26 @@ def test_help_says_arguments_by_their_names_and_defaults_as_they_are_typed(capfd
 def test_a_wrong_value_is_named_once(words: tuple[str, ...], value: str, said: str, capfd: Capture) -> None:
     code, _, err = call(capfd, *words)
     assert (code, said in err, err.count(repr(value))) == (2, True, 1)
+
+
+def test_the_application_says_exit_codes_and_the_first_sentence_of_each_command(capfd: Capture) -> None:
+    told = call(capfd, "-h")
+    text = " ".join(told.out.split())
+    for meaning in (
+        "0 done and verified",
+        "1 judged",
+        "2 wrong input",
+        "3 no curve",
+        "4 file trouble",
+        "70 a bug",
+    ):
+        assert meaning in text
+    assert (
+        "pose Multiply rotations and displacements about fixed and current axes; print every representation "
+        in text
+    )
+    assert "urdf Make a robot file of a URDF: DH table, base, tool, limits, inertias calibrate" in text
+    assert told.out.split() == call(capfd).err.split()
 
 
 def test_a_command_with_other_values_is_another_one() -> None:
