@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ from tiers import few
 from tests.cli.running import EXAMPLES, ROOT, call
 from trajcli.__main__ import _print_version
 from trajcli.errors import TrajcliError
-from trajcli.version import Library, libraries, library_error
+from trajcli.version import Library, libraries, library_error, version_lines
 
 Capture = pytest.CaptureFixture[str]
 DECLARED = ["numpy>=1.26", "ruckig>=0.19", "plain", "mkdocs<2,>=1.6; extra == 'docs'"]
@@ -154,6 +155,65 @@ def test_a_module_of_our_own_is_no_library() -> None:
     assert said(ModuleNotFoundError("no module", name="trajcli.nothing")) is None
 
 
+INSTALLED_AS = {
+    "yaml.events": "pyyaml",
+    "pydantic_core._core": "pydantic",
+    "mpl_toolkits.mplot3d": "matplotlib",
+    "PIL.Image": "pillow",
+    "dateutil": "python-dateutil",
+}
+
+
+@pytest.mark.parametrize("module", INSTALLED_AS)
+def test_a_module_is_of_the_library_under_whose_name_it_is_installed(
+    module: str, environment: Environment
+) -> None:
+    name = INSTALLED_AS[module]
+    environment.has(name, "99.0")
+    line = said(ImportError("bad magic", name=module))
+    assert line is not None
+    assert line.startswith(
+        f"the library {name} 99.0 cannot be loaded (bad magic): python -m pip install --force"
+    )
+    assert f" '{name}" in line
+
+
+def test_what_nobody_declares_or_an_extra_lacks_is_no_cause_of_other_errors(environment: Environment) -> None:
+    environment.has("nothing", None)
+    wanted = "the library nothing is not installed, which this needs: python -m pip install 'nothing'"
+    assert said(ModuleNotFoundError("no module", name="nothing.at_all")) == wanted
+    environment.has("dask", "1.0")
+    environment.has("toppra", None)
+    assert said(AttributeError("trapezoid")) is None
+
+
+def test_the_report_of_a_bug_has_each_library_and_all_that_extras_lack(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    extras = ["a>=1; extra == 'x'", "b>=2; extra == 'x'", "c; extra == 'y'"]
+    versions = {"numpy": "1.26", "ruckig": "0.18.9", "b": "1.10", "c": "3"}
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: [*DECLARED[:2], *extras])
+    monkeypatch.setattr(importlib.metadata, "version", versions.get)
+    _, python, *lines = version_lines()
+    assert python == f"Python {platform.python_version()} on {platform.system()} {platform.machine()}"
+    mended = "python -m pip install 'ruckig>=0.19'"
+    assert lines == [
+        "numpy 1.26",
+        f"the library ruckig 0.18.9 is installed, and trajcli needs 0.19 or later: {mended}",
+        "extra x: lacks a, b",
+        "extra y: installed",
+    ]
+
+
+def test_a_clone_that_is_not_installed_declares_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def requires(name: str) -> list[str]:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "requires", requires)
+    assert libraries() == []
+    assert len(list(version_lines())) == 2
+
+
 def test_requirements_are_read_as_they_are_declared(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: DECLARED)
     monkeypatch.setattr(importlib.metadata, "version", {"numpy": "2.1", "ruckig": "0.18.9"}.get)
@@ -176,5 +236,11 @@ def test_the_version_with_those_of_the_libraries(environment: Environment, capsy
     assert f"numpy {importlib.metadata.version('numpy')}" in lines
     assert any(line.startswith("the library toppra is not installed") for line in lines)
     assert any(line.startswith("extra dask: ") for line in lines)
-    assert _print_version(["--nothing"]) == 2
-    assert "--verbose" in capsys.readouterr().err
+    assert _print_version(["-v"]) == 0
+    assert capsys.readouterr().out.splitlines() == lines
+    assert _print_version([]) == 0
+    assert capsys.readouterr().out == f"{lines[0]}\n"
+    for words in (["--nothing"], ["--verbose", "-v"]):
+        assert _print_version(words) == 2
+        told = capsys.readouterr()
+        assert (told.out, "--verbose" in told.err) == ("", True)
