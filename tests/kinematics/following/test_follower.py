@@ -192,7 +192,7 @@ def test_an_orientation_that_is_missed_alone_is_lost():
     assert caught.value.missed == pytest.approx((0.0, 0.01), abs=1e-9)
 
 
-@pytest.mark.parametrize("beyond", [1e-3, 1e-6, -1e-6])
+@pytest.mark.parametrize("beyond", [1e-3, 1e-6, -1e-6, 3e-9])
 def test_a_little_out_of_reach_is_lost_too(beyond):
     """An arm that is stretched along x, or against it, and a tool that goes on."""
     made = case("planar3r", [0.0 if beyond > 0.0 else np.pi, 0.0, 0.0], "yaw", "x")
