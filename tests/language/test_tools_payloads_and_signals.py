@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
@@ -15,7 +16,7 @@ from trajcli.kinematics.robot import Friction, MountedTool, Payload
 from trajcli.kinematics.zone import Zone
 from trajcli.language.numbers import ReadingContext
 from trajcli.language.signals import SignalAt
-from trajcli.language.zones import ZoneField
+from trajcli.language.zones import SignalsField, ZoneField
 
 DEG = math.pi / 180
 HEAD = "version: 1\nunits: {angle: deg, length: mm}\nrobot: ur5e\nstart: {joints: [0, -90, 90, 0, 90, 0]}\n"
@@ -175,6 +176,11 @@ def test_a_zone_that_is_none_says_what_one_is_and_one_that_is_made_stays_itself(
         with pytest.raises(InputError) as caught:
             job(f"zone: {text}\n")
         assert str(caught.value.problems[0].hint).startswith(hint)
+    schema = ZoneField("About the corner.").json_schema()
+    taken = ("stop", 20, "20 mm", {"position": 0, "joints": [1, 2]}, {"orientation": "3 deg"})
+    refused = ("here", -1, {}, {"radius": 3}, {"position": "far"}, None)
+    assert [Draft202012Validator(schema).is_valid(each) for each in taken + refused] == [True] * 5 + [False] * 6
+    assert (schema["description"], SignalsField("Set.").json_schema()["description"]) == ("About the corner.", "Set.")
     zone = Zone(orientation=0.5)
     assert ZoneField("").read(zone, ReadingContext()) is zone
 
