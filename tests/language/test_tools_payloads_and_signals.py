@@ -179,8 +179,13 @@ def test_a_zone_that_is_none_says_what_one_is_and_one_that_is_made_stays_itself(
     schema = ZoneField("About the corner.").json_schema()
     taken = ("stop", 20, "20 mm", {"position": 0, "joints": [1, 2]}, {"orientation": "3 deg"})
     refused = ("here", -1, {}, {"radius": 3}, {"position": "far"}, None)
-    assert [Draft202012Validator(schema).is_valid(each) for each in taken + refused] == [True] * 5 + [False] * 6
-    assert (schema["description"], SignalsField("Set.").json_schema()["description"]) == ("About the corner.", "Set.")
+    assert [Draft202012Validator(schema).is_valid(each) for each in taken + refused] == [True] * 5 + [
+        False
+    ] * 6
+    assert (schema["description"], SignalsField("Set.").json_schema()["description"]) == (
+        "About the corner.",
+        "Set.",
+    )
     zone = Zone(orientation=0.5)
     assert ZoneField("").read(zone, ReadingContext()) is zone
 
