@@ -55,6 +55,33 @@ def test_what_was_set_aside_is_removed_where_it_is_a_file(tmp_path: Path) -> Non
     assert kept.read_text() == "of somebody"
 
 
+def test_what_cannot_be_renamed_is_not_said_to_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError("as in a folder that is closed")
+
+    rows = tmp_path / "rows.csv"
+    rows.write_text("one")
+    monkeypatch.setattr(Path, "replace", refuse)
+    assert set_aside(str(rows)) is None
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.csv"]
+
+
+def test_what_stands_beside_standard_output_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("-.stale").write_text("a file of that name")
+    remove_aside("-")
+    assert Path("-.stale").is_file()
+
+
+def test_two_outputs_to_the_descriptor_of_a_device_are_one(tmp_path: Path) -> None:
+    """A terminal, say; the device itself takes any number of outputs."""
+    with Path(os.devnull).open("wb") as device, (tmp_path / "a").open("wb") as file:
+        number = device.fileno()
+        assert identity(f"/dev/fd/{number}") == identity("-", number) == identity(f"/proc/self/fd/{number}")
+        assert identity(f"/dev/fd/{number}") not in (None, identity(f"/dev/fd/{file.fileno()}"))
+    assert identity(os.devnull) is None
+
+
 def test_only_what_the_process_left_is_removed(tmp_path: Path) -> None:
     for name in (".trajcli-12-ab.part", ".trajcli-123-ab.part", ".trajcli-12-ab.csv", "trajcli-12-a.part"):
         (tmp_path / name).touch()

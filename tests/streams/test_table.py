@@ -131,6 +131,7 @@ def test_chunks_join_without_a_seam(tmp_path, monkeypatch):
         ("\n0,1\n", [("in.csv:1:1", "column 1 of 1 has no name")]),
         ("t,q1\n", [("in.csv:1:1", "the file has no rows, only the columns' names")]),
         ("t,q1\n\n", [("in.csv:1:1", "the file has no rows, only the columns' names")]),
+        ("# an arm\nt,q1\n", [("in.csv:2:1", "the file has no rows, only the columns' names")]),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_with_its_place(tmp_path, text, expected):

@@ -101,6 +101,31 @@ def test_a_pipe_is_written_to(tmp_path):
     assert names(tmp_path) == ["pipe"]
 
 
+def test_an_open_descriptor_takes_what_follows_and_nothing_of_a_failure():
+    reading, writing = os.pipe()
+    write(f"/dev/fd/{writing}", b"one ")
+    write(f"/dev/fd/{writing}", b"two")
+    with pytest.raises(ValueError, match="half"), whole_file(f"/proc/self/fd/{writing}") as out:  # noqa: PT012
+        out.write(b"half a row")
+        raise ValueError("half")
+    os.close(writing)
+    with os.fdopen(reading, "rb") as stream:
+        assert stream.read() == b"one two"
+
+
+def test_nothing_of_a_failure_reaches_standard_output(monkeypatch):
+    reading, writing = os.pipe()
+    with os.fdopen(writing, "w") as shown, monkeypatch.context() as patched:
+        patched.setattr(sys, "stdout", shown)
+        with standard_output() as out:
+            out.write(b"whole")
+        with pytest.raises(ValueError, match="half"), standard_output() as out:  # noqa: PT012
+            out.write(b"half a row")
+            raise ValueError("half")
+    with os.fdopen(reading, "rb") as stream:
+        assert stream.read() == b"whole"
+
+
 def test_dev_stdout_goes_where_stdout_goes(tmp_path):
     """Also when that is a file: what stood in it before stays, and what comes later follows."""
     path = tmp_path / "out.txt"
@@ -172,6 +197,21 @@ def test_what_stands_under_a_path(tmp_path):
     with pytest.raises(FileError, match="File name too long") as caught:
         kind_of(tmp_path / ("x" * 300))
     assert caught.value.exit_code == 4
+
+
+def test_what_is_below_a_folder_is_listed_by_name(tmp_path):
+    wanted = [
+        tmp_path / "a",
+        *(tmp_path / "a" / f"{number:02d}.csv" for number in range(20)),
+        tmp_path / "b.csv",
+    ]
+    wanted[0].mkdir()
+    for path in wanted[:0:-1]:
+        path.write_bytes(b"")
+    assert paths_below(tmp_path) == wanted
+    assert paths_below(str(tmp_path), "*9.csv") == [wanted[10], wanted[20]]
+    with pytest.raises(FileError, match=r"b\.csv' cannot be read: "):
+        paths_below(tmp_path / "b.csv")
 
 
 def test_a_disk_that_fills_leaves_what_was(tmp_path):

@@ -1,0 +1,222 @@
+"""What a plan says beside its motion: events with move, joint and value, what has no limit, and where errors are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from planning.test_payload_capacity import HEAD
+from random_jobs import loaded
+from scipy.interpolate import CubicSpline
+
+from trajcli.errors import InputError, MissingLimitError, PlanningError
+from trajcli.job.read import job_from_text
+from trajcli.planning.plan import Plan, plan_job
+
+TWO = {"joints": [{"name": "a"}, {"name": "slide", "type": "prismatic"}]}
+SIGNAL = {"signal": "lamp", "value": 1}
+UNITS = ("rad", "m")
+
+
+def job_of(
+    *moves: Mapping[str, Any], start: Mapping[str, Any] | None = None, **others: Any
+) -> dict[str, Any]:
+    """Return a job of an axis that turns and one that slides, in SI."""
+    return {"version": 1, "robot": TWO, "start": start or {"joints": [0, 0]}, "moves": list(moves), **others}
+
+
+def planned(*moves: Mapping[str, Any], **others: Any) -> Plan:
+    return plan_job(loaded(job_of(*moves, **others)))
+
+
+def through(rows: Sequence[Sequence[float]], times: Sequence[float]) -> list[dict[str, Any]]:
+    return [{"joints": list(row), "time": time} for row, time in zip(rows, times, strict=True)]
+
+
+@pytest.mark.parametrize("fastest", [0, 1])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_motion_without_rest_is_said_of_the_joint_that_is_fastest(fastest: int, sign: int) -> None:
+    """Between signals, which move nothing."""
+    times = [0, 1, 2, 4]
+    rows = np.zeros((4, 2))
+    rows[:, fastest] = sign * np.array([0, -200, 100, 300.0])
+    rows[:, 1 - fastest] = [0, 5, 10, 12]
+    points = through(rows[1:].tolist(), times[1:])
+    plan = planned(SIGNAL, {"planner": "spline", "rule": "natural", "through": points}, SIGNAL)
+    spline = CubicSpline(times, rows, bc_type="natural")
+    name, unit = ("a", "slide")[fastest], UNITS[fastest]
+    assert [(event.kind, event.move, event.message) for event in plan.events] == [
+        (kind, 1, f"the trajectory {what} in motion, {name} with {spline(at, 1)[fastest]:.9g} {unit}/s")
+        for kind, what, at in (("begins_moving", "begins", 0), ("ends_moving", "ends", 4))
+    ]
+    assert plan.trajectory.start.velocity == pytest.approx(spline(0, 1), rel=1e-9)
+    assert plan.trajectory.end.velocity == pytest.approx(spline(4, 1), rel=1e-9)
+
+
+@pytest.mark.parametrize("velocity", [(3, -40), (-40, 3), (3, 40)])
+def test_a_motion_begins_before_its_first_point_by_half_a_blend(velocity: tuple[float, float]) -> None:
+    """Centred on the start, which is passed with the velocity that the job says."""
+    lasts = 0.2
+    move = {"planner": "blends", "through": through([[5, -200], [10, 100]], [1, 2]), "blend_durations": lasts}
+    plan = planned(SIGNAL, move, SIGNAL, start={"joints": [0, 0], "velocity": list(velocity)})
+    joint = int(np.argmax(np.abs(velocity)))
+    by = f"{('a', 'slide')[joint]} by {abs(velocity[joint]) * lasts / 2:.9g} {UNITS[joint]}"
+    (event,) = plan.events
+    assert (event.kind, event.move) == ("begins_before", 1)
+    assert event.message == f"the trajectory begins before its first point, {by}"
+    assert plan.trajectory.start.position == pytest.approx(-np.array(velocity) * lasts / 2)
+    assert plan.trajectory.start.velocity == pytest.approx(velocity)
+
+
+def ramped(joint: int, speed: float, ramp: float) -> dict[str, Any]:
+    """Return a move of one joint with ramps of a length, s."""
+    to = [0, 0]
+    to[joint] = -20
+    return {"planner": "trapezoid", "to": {"joints": to}, "velocity": speed, "acceleration": speed / ramp}
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_ramp_that_stamps_cannot_tell_is_a_step_of_its_joint(joint: int) -> None:
+    """Another move is faster, and a step is small or not beside what its own joint does."""
+    swift = {"planner": "cubic", "to": {"joints": [[0, 6e4], [6e4, 0]][joint]}, "duration": 3}
+    back = {**swift, "to": {"joints": [0, 0]}}
+    wait = {"planner": "hold", "duration": 1}
+    plan = planned(wait, swift, back, ramped(joint, 0.01, 3e-11), SIGNAL)
+    (event,) = plan.events
+    name = ("a", "slide")[joint]
+    assert (event.kind, event.move) == ("velocity_step", None)
+    assert f"the velocity of {name} changes by 0.01" in event.message
+    assert f" {UNITS[joint]}/s in " in event.message
+    assert ", at t = 7 s: " in event.message
+    assert not planned(wait, swift, back, ramped(joint, 0.01, 3e-9)).events
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        ({"velocity": [100, None], "position": [[-90, 90], None]}, "position of slide, velocity of slide, acceleration, jerk"),
+        ({"jerk": [None, 9000], "velocity": 100, "position": [[-90, 90], [-9, 9]]}, "acceleration, jerk of a"),
+        ({"velocity": 100, "position": [[-90, 90], [-9, 9]], "acceleration": 9000, "jerk": 90000}, ""),
+    ],
+)  # fmt: skip
+def test_what_has_no_limit_names_the_joints_where_others_have_one(limits: dict[str, Any], words: str) -> None:
+    assert (
+        planned({"planner": "quintic", "to": {"joints": [1, 0.2]}, "duration": 1}, limits=limits).unchecked
+        == words
+    )
+
+
+def test_what_limits_lack_is_said_once_for_all_moves_alike() -> None:
+    """The states between are those that the job says, as nothing could be planned."""
+    two, away, home = "jerk_limited", {"joints": [1, 1]}, {"joints": [0, 0]}
+    alike = [{"planner": "trapezoid", "to": to} for to in (away, home, away)]
+    slide = {"planner": "trapezoid", "to": {"joints": [1, 0]}}
+    named = {"planner": two, "to": home}
+    with pytest.raises(MissingLimitError) as caught:
+        planned(*alike, slide, named, limits={"velocity": 3})
+    found = caught.value.problems
+    assert [problem.move for problem in found] == [0, 3, 4]
+    more = [problem.message.partition(" (and ")[2] for problem in found]
+    assert more == ["2 more moves likewise)", "", ""]
+    assert "of slide " in found[1].message
+    assert "of a, slide " not in found[1].message
+    assert "of a to find" in found[2].message
+
+
+def test_what_lacks_is_said_before_what_cannot_be_planned_behind_it() -> None:
+    lacking = {"planner": "trapezoid", "to": {"joints": [1, 1]}}
+    moving = {"planner": "quintic", "to": {"joints": [0, 0], "velocity": [1, 1]}, "duration": 1}
+    still = {"planner": "trapezoid", "to": {"joints": [2, 0]}, "duration": 1e-3}
+    with pytest.raises(MissingLimitError) as caught:
+        planned(lacking, moving, still, lacking, limits={"velocity": 3})
+    assert [problem.move for problem in caught.value.problems] == [0]
+
+
+@pytest.mark.parametrize("planner", ["cubic", "quintic"])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_an_acceleration_at_the_start_is_taken_up_by_each_joint_or_refused(planner: str, joint: int) -> None:
+    acceleration = [0.0, 0.0]
+    acceleration[joint] = 5.0
+    start = {"joints": [0, 0], "acceleration": acceleration}
+    move = {"planner": planner, "to": {"joints": [1, 1]}, "duration": 1}
+    if planner == "quintic":
+        assert planned(SIGNAL, move, start=start).trajectory(0.0, 2) == pytest.approx(acceleration)
+        return
+    with pytest.raises(InputError, match="cubic cannot start with an acceleration") as caught:
+        planned(SIGNAL, move, start=start)
+    (problem,) = caught.value.problems
+    assert problem.place is not None
+    assert json.dumps(job_of(SIGNAL, move, start=start))[problem.place.column - 1 :].startswith(
+        '{"joints": [0, 0], "acc'
+    )
+
+
+def test_an_error_says_its_move_and_its_time_in_the_job() -> None:
+    """An arm that stands up on its other side: gravity takes most where it lies, in the middle of a cubic."""
+    moves = "moves:\n  - {planner: hold, duration: 1.5}\n  - {planner: hold, duration: 0.5}\n"
+    moves += "  - {planner: cubic, to: {joints: [-90, 0]}, duration: 4}\n"
+    text = f"{HEAD}limits: {{effort: {{a: 20, b: 20}}}}\nstart: {{joints: [90, 0]}}\n{moves}"
+    with pytest.raises(PlanningError) as caught:
+        plan_job(job_from_text(text))
+    (problem,) = caught.value.problems
+    assert (problem.move, problem.joint, problem.limit) == (2, "a", pytest.approx(20))
+    assert problem.message.startswith("move 2 (cubic): ")
+    assert problem.value == pytest.approx(9.81 * (4 * 0.25 + 2 * 0.7))
+    assert problem.time == pytest.approx(1.5 + 0.5 + 2, abs=1e-6)
+    assert problem.place is not None
+    assert (
+        problem.place.line
+        == text.splitlines().index("  - {planner: cubic, to: {joints: [-90, 0]}, duration: 4}") + 1
+    )
+
+
+def test_events_of_a_move_behind_another_say_which() -> None:
+    around = [{"joints": point} for point in ([1, 1], [1, 1], [2, 0])]
+    course = {
+        "planner": "time_optimal",
+        "through": around,
+        "to": {"joints": [0, 0]},
+        "when_over_limit": "slow",
+    }
+    plan = planned({"planner": "hold", "duration": 1}, course, limits={"velocity": 2, "acceleration": 4})
+    found = (*plan.events, *plan.remarks)
+    assert {"merged", "bound"} <= {event.kind for event in found}
+    assert {event.move for event in found} == {1}
+
+
+@pytest.mark.parametrize("swinging", [0, 1])
+def test_a_remark_names_the_joint_that_leaves_its_chords(swinging: int) -> None:
+    """Both have the same limits, so that the nearest point of a chord is that of Euclid."""
+    points = np.array([[0, 0], [0.1, 0.1], [0.2, 0.2]])
+    points[1, swinging] = 1.0
+    _, middle, last = ({"joints": point} for point in points.tolist())
+    move = {"planner": "waypoints", "through": [middle], "to": last}
+    limits = {"velocity": 2, "acceleration": 4, "jerk": 40}
+    plan = planned({"planner": "hold", "duration": 1}, move, limits=limits)
+    rows = plan.trajectory(np.linspace(1, plan.trajectory.duration, 4001))
+    beside = []
+    for begin, end in pairwise(points):
+        along = np.clip((rows - begin) @ (end - begin) / np.sum((end - begin) ** 2), 0, 1)
+        beside.append(rows - begin - along[:, None] * (end - begin))
+    nearest = np.linalg.norm(beside, axis=2).argmin(axis=0)
+    off = np.abs(np.where(nearest[:, None] == 0, *beside)).max(axis=0)
+    joint = int(off.argmax())
+    (remark,) = plan.remarks
+    assert (remark.kind, remark.move) == ("fastest_found", 1)
+    said = remark.message.partition("leaves the chords by up to ")[2].split()
+    assert said[1:3] == [UNITS[joint], f"({('a', 'slide')[joint]}"]
+    assert float(said[0]) == pytest.approx(off[joint], rel=1e-4)
+
+
+@pytest.mark.parametrize("masses", [(2, 200), (200, 2)])
+def test_of_several_payloads_that_nobody_judges_the_heaviest_is_said(masses: tuple[int, int]) -> None:
+    moves = "".join(
+        f"  - {{attach: {{mass: {mass}}}}}\n  - {{planner: hold, duration: 1}}\n  - {{detach: {{}}}}\n"
+        for mass in masses
+    )
+    plan = plan_job(job_from_text(f"{HEAD}start: {{joints: [0, 0]}}\nmoves:\n{moves}"))
+    assert plan.unchecked.endswith("effort with 200 kg carried")
