@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from trajcli.errors import InputError
+from trajcli.errors import Amount, InputError, MissingLimitError, PlanningError, Problem
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.zone import Zone
 from trajcli.planning import flown_job
@@ -143,6 +143,130 @@ def test_an_aligned_chain_lasts_the_next_whole_number_of_periods(
 ) -> None:
     monkeypatch.setattr(flown_job, "stretched_chain", lambda chain, factor: chain.duration * factor)
     assert flown_job._aligned(SimpleNamespace(duration=duration), 100.0) == pytest.approx(periods / 100.0)  # type: ignore[arg-type]
+
+
+def made(index: int, duration: float) -> Any:
+    """Return what counts of a planned move."""
+    return SimpleNamespace(index=index, duration=duration, robot=("arm", index))
+
+
+def corner(move: int, zone: float = 0.02) -> FlownCorner:
+    return FlownCorner(move, Zone(position=zone), explicit=False)
+
+
+def test_zones_and_durations_of_several_chains_are_of_the_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Moves of 1 to 7 s: of three chains the first saves 0.5 s of 5, the second stops, the third saves 1 s of 13."""
+    durations, saved, lowered = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0), {1: 0.5, 5: 1.0}, {1: 0.25, 5: 0.125}
+    moves = [made(k, duration) for k, duration in enumerate(durations)]
+    tried = []
+
+    def chain(_: Any, some: Any, group: Any, adapted: Any, stopping: float, events: list[Any]) -> Any:
+        first = group[0].move
+        assert [move.index for move in some] == [first, first + 1]
+        tried.append((first, adapted, stopping))
+        if first not in saved:
+            events.append(f"stops {first}")
+            return None
+        lasts = stopping - saved[first]
+        return SimpleNamespace(first=first, duration=lasts, model=lasts - lowered[first])
+
+    def zones(of: Any) -> list[Any]:
+        return [SimpleNamespace(shifted=lambda begun, before: (of.first, begun, before))]
+
+    def as_flown(some: Any, of: Any) -> list[Any]:
+        return [made(move.index, of.duration / 2) for move in some]
+
+    monkeypatch.setattr(flown_job, "_chain", chain)
+    monkeypatch.setattr(flown_job, "flown_zones", zones)
+    monkeypatch.setattr(flown_job, "moves_as_flown", as_flown)
+    monkeypatch.setattr(flown_job, "zone_events", lambda found, names: [(found[0][0], names)])
+    job = loaded(HOLD)
+    found, flyby, events = flown_job._fly(job, moves, [corner(1), corner(3), corner(5)], None)
+    assert tried == [(1, None, 5.0), (3, None, 9.0), (5, None, 13.0)]
+    assert [move.duration for move in found] == [1.0, 2.25, 2.25, 4.0, 5.0, 6.0, 6.0]
+    assert flyby.zones == ((1, 1.0, 0), (5, 14.5, 1))
+    assert (flyby.duration, flyby.stopping, flyby.searched) == (26.5, 28.0, 26.125)
+    assert flyby.chains is None
+    assert events == [(1, job.robot.joint_names), "stops 3", (5, job.robot.joint_names)]
+    _, flyby, events = flown_job._fly(job, moves, [corner(1), corner(5)], None)
+    assert [chain.first for chain in flyby.chains or ()] == [1, 5]
+    lowered |= {1: -0.25, 5: -0.125}  # the search has found nothing faster than what is flown
+    assert flown_job._fly(job, moves, [corner(1), corner(5)], None)[1].searched == 26.5
+
+
+ADAPTED: Any = SimpleNamespace(
+    stretches={1: 1.25, 2: 1.5},
+    within=lambda robot, index: (*robot, index),
+    chain_key=lambda moves: tuple(move.index for move in moves),
+)
+
+
+def chain_of(
+    monkeypatch: pytest.MonkeyPatch, lasts: float, adapted: Any = None, stopping: float = 3.0, **fields: Any
+) -> tuple[Any, list[Any]]:
+    """Return the chain of moves 1 to 3 about two zones, its fastest motion known, and events."""
+    monkeypatch.setattr(flown_job, "flown", lambda *given: SimpleNamespace(duration=lasts, given=given))
+    monkeypatch.setattr(
+        flown_job,
+        "stretched_chain",
+        lambda of, by: SimpleNamespace(duration=of.duration * by, given=of.given),
+    )
+    events: list[Any] = []
+    moves = [made(k, 1.0) for k in (1, 2, 3)]
+    corners = [corner(1, 0.1), corner(2, 0.2)]
+    found = flown_job._chain(loaded(HOLD, **fields), moves, corners, adapted, stopping, events)
+    return found, events
+
+
+def test_a_chain_is_stretched_as_the_slowest_of_its_moves_and_within_the_limits_of_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ADAPTED.chains = {}
+    found, events = chain_of(monkeypatch, 1.5, ADAPTED)
+    assert found.duration == 1.5 * 1.5
+    moves, zones, robots = found.given
+    assert [zone.position for zone in zones] == [0.1, 0.2]
+    assert robots == [("arm", move.index, 1, 2, 3) for move in moves]
+    again, _ = chain_of(monkeypatch, 1.0, ADAPTED)
+    assert again.duration == found.duration, "the search is done once"
+    assert not events
+    aligned, _ = chain_of(monkeypatch, 1.501, output={"rate": 100, "align": True})
+    assert aligned.duration == pytest.approx(1.51)
+    alone, _ = chain_of(monkeypatch, 1.501)
+    assert (alone.duration, [robot for _, robot in alone.given[2]]) == (1.501, [1, 2, 3])
+
+
+@pytest.mark.parametrize(("lasts", "flies"), [(3.0, False), (3.0 * (1 - 1e-12), False), (2.9999, True)])
+def test_a_chain_that_gains_nothing_stops(lasts: float, flies: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    found, events = chain_of(monkeypatch, lasts)
+    assert (found is not None) == flies
+    assert [(event.kind, event.move) for event in events] == ([] if flies else [("not_faster", 1)])
+    if not flies:
+        assert events[0].text(lambda amount: f"{amount.value} s").endswith("which takes 3.0 s")
+
+
+def test_why_a_chain_stops_is_said_of_its_corners(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: Any) -> Any:
+        raise PlanningError(Problem("{joint} is at {value}", amounts={"joint": "j1", "value": Amount(2.0)}))
+
+    def lack(*_: Any) -> Any:
+        raise MissingLimitError(Problem("no limit"))
+
+    monkeypatch.setattr(flown_job, "_fastest", refuse)
+    events: list[Any] = []
+    moves = [made(k, 1.0) for k in (1, 2, 3)]
+    job = loaded(HOLD, HOLD)
+    assert flown_job._chain(job, moves, [], None, 3.0, events) is None
+    assert flown_job._chain(job, moves[:2], [], None, 3.0, events) is None
+    assert [event.text(lambda amount: f"{amount.value} rad") for event in events] == [
+        "stops at the corners of moves 1 to 2: j1 is at 2.0 rad",
+        "stops at the corner of move 1: j1 is at 2.0 rad",
+    ]
+    assert [(event.kind, event.move) for event in events] == [("not_faster", 1)] * 2
+    monkeypatch.setattr(flown_job, "_fastest", lack)
+    with pytest.raises(MissingLimitError) as caught:
+        flown_job._chain(job, moves, [], None, 3.0, events)
+    assert caught.value.problems[0].place == job.place_of_move(1) != job.place_of_move(0)
 
 
 @cache

@@ -133,6 +133,7 @@ def test_turns_out_of_range_are_an_event_and_the_nearest_are_taken() -> None:
     to = {**pose_of("irb4600", ABB[0][0]), "configuration": {"abb": [2, 0, 0, 0]}}
     plan = planned("irb4600", to)
     (event,) = [event for event in plan.events if event.kind == "turns_not_met"]
+    assert event.move == 0
     assert "abb [2, 0, 0, 0] says turns of joint_1" in event.message
     np.testing.assert_allclose(end(plan), ABB[0][0], atol=1e-6)
 

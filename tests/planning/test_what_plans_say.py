@@ -38,13 +38,15 @@ def through(rows: Sequence[Sequence[float]], times: Sequence[float]) -> list[dic
 
 
 @pytest.mark.parametrize("fastest", [0, 1])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_motion_without_rest_is_said_of_the_joint_that_is_fastest(fastest: int, sign: int) -> None:
+@pytest.mark.parametrize(("sign", "other"), [(1, (0, 5, 10, 12)), (-1, (0, 5, 10, 12)), (-1, (0, 0, 0, 0))])
+def test_a_motion_without_rest_is_said_of_the_joint_that_is_fastest(
+    fastest: int, sign: int, other: tuple[float, ...]
+) -> None:
     """Between signals, which move nothing."""
     times = [0, 1, 2, 4]
     rows = np.zeros((4, 2))
     rows[:, fastest] = sign * np.array([0, -200, 100, 300.0])
-    rows[:, 1 - fastest] = [0, 5, 10, 12]
+    rows[:, 1 - fastest] = other
     points = through(rows[1:].tolist(), times[1:])
     plan = planned(SIGNAL, {"planner": "spline", "rule": "natural", "through": points}, SIGNAL)
     spline = CubicSpline(times, rows, bc_type="natural")
