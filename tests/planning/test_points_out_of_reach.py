@@ -118,3 +118,15 @@ def test_where_an_arc_passes_its_via_point() -> None:
     arc = Arc(np.array([1.0, 0, 0]), np.zeros(3), np.array([0, 0, 1.0]), -2.0, 0.0)
     there = arc.evaluate(np.array([0.7]))[0][0]
     assert arc.s_of(there) == pytest.approx(0.7)
+
+
+def test_a_pose_of_a_later_move_is_named_where_it_stands() -> None:
+    """No point has its name: the second segment of the second move, behind a list of others."""
+    away = "{xyz: [400, 1500, 300], rpy: [180, 0, 0]}"
+    moves = f"  - {{planner: line, to: near}}\n  - planner: path\n    radius: 5\n    segments: [{{line: high}}, {{line: {away}}}]\n"
+    problem = refused(moves)
+    assert problem.move == 1
+    assert problem.place is not None
+    lines = (HEAD + moves).splitlines()
+    assert problem.place.line == len(lines)
+    assert lines[-1][problem.place.column - 1 :].startswith(away)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trajcli.errors import PlanningError
+from trajcli.errors import MissingLimitError, PlanningError
 from trajcli.job.read import job_from_text, load_job
 from trajcli.planning.advice import unit_hint
 from trajcli.planning.plan import plan_job
@@ -147,3 +147,41 @@ def test_of_bare_joints_what_is_fifty_metres_away_is_too_far() -> None:
         text = f"version: 1\nrobot: {{joints: [{{type: prismatic}}]}}\nstart: {{joints: {value}}}\n"
         hint = unit_hint(job_from_text(text + "moves: [{planner: hold, duration: 1}]\n", "job.yaml"))
         assert (hint is not None) == hinted
+
+
+def findings_of(limits: str, *targets: float) -> dict[tuple[int | None, str], str]:
+    """Return the hints of what is wrong with moves of a turning joint, by move and kind."""
+    moves = "".join(f"  - {{planner: cubic, to: {{joints: {target}}}, duration: 1}}\n" for target in targets)
+    text = f"version: 1\nrobot: {{joints: 1}}\nlimits: {limits}\nstart: {{joints: 0}}\nmoves:\n{moves}"
+    verdict = plan_job(job_from_text(text, "job.yaml")).verdict
+    return {(finding.move, finding.kind): finding.hint or "" for finding in verdict.findings}
+
+
+def test_rates_are_over_their_limits_because_of_units_where_a_position_is() -> None:
+    """A spindle may turn often, and too fast; one of four turns at most is meant in degrees, in all its moves."""
+    spindle = findings_of("{velocity: 20}", 20, 90)
+    assert set(spindle) == {(0, "velocity"), (1, "velocity")}
+    assert not any("units" in hint for hint in spindle.values())
+    found = findings_of("{velocity: 20, position: [[-25, 25]], jerk: 1000}", 20, 90)
+    assert {(0, "velocity"), (1, "velocity"), (1, "position")} <= set(found)
+    for (_, kind), hint in found.items():
+        assert ("angles up to 90 look like degrees" in hint) == (kind in ("velocity", "position")), (
+            kind,
+            hint,
+        )
+
+
+def test_an_error_keeps_what_else_would_help() -> None:
+    """What lacks is no matter of units; a point that is not reached may be, or not."""
+    (hint,) = hints_of(f"version: 1\nrobot: ur5e\n{JOINTS}{POSE}")
+    (own,) = hints_of(
+        "version: 1\nrobot: ur5e\nstart: {joints: 0}\n"
+        + POSE.replace("[400, 100, 250], rpy: [180", "[4, 1, 2], rpy: [1")
+    )
+    assert own
+    assert hint.startswith("angles up to 180 look like degrees")
+    assert hint.endswith(f"; else {own}")
+    lacking = "moves: [{planner: trapezoid, to: {joints: [90, 0, 0, 0, 0, 0]}}]\n"
+    with pytest.raises(MissingLimitError) as caught:
+        plan_job(job_from_text(f"version: 1\nrobot: ur5e\nstart: {{joints: 0}}\n{lacking}", "job.yaml"))
+    assert "units" not in (caught.value.problems[0].hint or "")

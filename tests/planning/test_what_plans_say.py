@@ -83,18 +83,62 @@ def ramped(joint: int, speed: float, ramp: float) -> dict[str, Any]:
 
 @pytest.mark.parametrize("joint", [0, 1])
 def test_a_ramp_that_stamps_cannot_tell_is_a_step_of_its_joint(joint: int) -> None:
-    """Another move is faster, and a step is small or not beside what its own joint does."""
-    swift = {"planner": "cubic", "to": {"joints": [[0, 6e4], [6e4, 0]][joint]}, "duration": 3}
-    back = {**swift, "to": {"joints": [0, 0]}}
+    """The other joint is faster, and changes its velocity by more, where stamps can tell."""
+    swift = {"planner": "trapezoid", "velocity": 3e4, "acceleration": 3e4}
+    there, back = ({**swift, "to": {"joints": [[0, far], [far, 0]][joint]}} for far in (6e4, 0))
     wait = {"planner": "hold", "duration": 1}
-    plan = planned(wait, swift, back, ramped(joint, 0.01, 3e-11), SIGNAL)
+    plan = planned(wait, there, back, ramped(joint, 0.01, 3e-11), SIGNAL)
     (event,) = plan.events
     name = ("a", "slide")[joint]
     assert (event.kind, event.move) == ("velocity_step", None)
     assert f"the velocity of {name} changes by 0.01" in event.message
     assert f" {UNITS[joint]}/s in " in event.message
     assert ", at t = 7 s: " in event.message
-    assert not planned(wait, swift, back, ramped(joint, 0.01, 3e-9)).events
+    assert not planned(wait, there, back, ramped(joint, 0.01, 3e-9)).events
+
+
+@pytest.mark.parametrize(("speed", "seen"), [(100, True), (3e4, False)])
+def test_a_step_is_none_beside_what_its_joint_does_elsewhere(speed: float, seen: bool) -> None:
+    fast = {"planner": "trapezoid", "velocity": speed, "acceleration": speed}
+    there, back = ({**fast, "to": {"joints": [far, 0]}} for far in (2 * speed, 0))
+    kinds = [event.kind for event in planned(there, back, ramped(0, 0.01, 3e-11)).events]
+    assert kinds == ["velocity_step"] * seen
+
+
+def test_a_trajectory_has_the_joints_and_spans_of_its_job() -> None:
+    """A slide and an axis that turns, there and back twice, from 7 s on."""
+    text = """
+version: 1
+robot: {convention: standard, joints: [{name: slide, type: prismatic, alpha: 1.5707963}, {name: a, a: 0.5}]}
+limits: {velocity: 2, acceleration: 5, jerk: null}
+start: {joints: [0, 0]}
+points: {p: {joints: [0.4, 0.2]}, s: {joints: [0, 0]}}
+moves:
+  - {planner: hold, duration: 0.5}
+  - repeat: 2
+    moves: [{planner: trapezoid, to: p}, {planner: trapezoid, to: s}]
+output: {rate: 10, start_time: 7}
+"""
+    plan = plan_job(job_from_text(text))
+    trajectory = plan.trajectory
+    assert (trajectory.joint_names, trajectory.joint_types) == (("slide", "a"), ("prismatic", "revolute"))
+    assert trajectory.start_time == 7
+    assert [span.ends for span in trajectory.spans] == ["", "-> p", "p -> s", "s -> p", "p -> s"]
+    assert [span.round for span in trajectory.spans] == ["", *["round 1 of 2"] * 2, *["round 2 of 2"] * 2]
+    assert [span.start for span in trajectory.spans[1:]] == [span.end for span in trajectory.spans[:-1]]
+    assert trajectory.spans[-1].end == trajectory.duration
+
+
+def test_laws_are_those_of_the_tool_on_its_path() -> None:
+    """A turn in joint space, and a straight line of 100 mm."""
+    turn, both = np.radians([10, 100])
+    x, y = 500 * np.cos(turn) + 400 * np.cos(both) - 60, 500 * np.sin(turn) + 400 * np.sin(both) + 80
+    text = f"{HEAD}start: {{joints: [0, 90]}}\nmoves:\n  - {{planner: quintic, to: {{joints: [10, 90]}}, duration: 1}}\n"
+    text += f"  - {{planner: line, to: {{xyz: [{x}, {y}, 0]}}, law: {{shape: quintic, duration: 2}}}}\n"
+    nothing, law = plan_job(job_from_text(text)).trajectory.laws
+    assert nothing is None
+    assert law is not None
+    assert law.evaluate(np.array([0.0, 1.0, 2.0])).ravel() == pytest.approx([0, 0.05, 0.1], abs=1e-9)
 
 
 @pytest.mark.parametrize(
