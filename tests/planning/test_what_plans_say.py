@@ -266,3 +266,16 @@ def test_of_several_payloads_that_nobody_judges_the_heaviest_is_said(masses: tup
     )
     plan = plan_job(job_from_text(f"{HEAD}start: {{joints: [0, 0]}}\nmoves:\n{moves}"))
     assert plan.unchecked.endswith("effort with 200 kg carried")
+
+
+def test_numbers_of_findings_keep_their_unit_when_they_are_said() -> None:
+    """In words they have the job's units, in fields those of SI."""
+    limits = {"velocity": [[-10, 10], [-1000, 1000]]}
+    move = {"planner": "cubic", "to": {"joints": [90, 900]}, "duration": 1}
+    plan = planned(move, limits=limits, units={"angle": "deg", "length": "mm"})
+    found = {finding.joint: finding for finding in plan.verdict.findings}
+    assert {joint: finding.si_unit for joint, finding in found.items()} == {"a": "rad/s", "slide": "m/s"}
+    assert found["a"].value == pytest.approx(np.radians(1.5 * 90))
+    assert found["slide"].value == pytest.approx(1.5 * 0.9)
+    assert "reaches 135 deg/s at t = 0.5 s, its limit is 10 deg/s" in found["a"].message
+    assert "reaches 1350 mm/s at t = 0.5 s, its limit is 1000 mm/s" in found["slide"].message

@@ -495,5 +495,4 @@ def _with_unit_hint(verdict: Verdict, loaded: LoadedJob) -> Verdict:
 
 
 def _in_units(verdict: Verdict, loaded: LoadedJob) -> Verdict:
-    findings = (replace(f, message=f.text(loaded.say), amounts={}, unit=f.si_unit) for f in verdict.findings)
-    return replace(verdict, findings=tuple(findings))
+    return replace(verdict, findings=tuple(found.said_by(loaded.say) for found in verdict.findings))
