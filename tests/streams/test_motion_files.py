@@ -14,6 +14,7 @@ from trajcli.errors import FileError, InputError
 from trajcli.streams import byte_source, recorded_motion
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.recorded_motion import blocks_of_size, open_motion
+from trajcli.units import Units
 
 DEGREE = np.pi / 180
 
@@ -154,6 +155,81 @@ def test_zeros_of_a_joint_in_radians_are_written_as_the_other_joint(tmp_path: Pa
     assert zeros.resolution.qd.tolist() == pytest.approx([0.0005, 0.0005])
     full = open_motion(written(tmp_path, "t,q1,q2", [[0, 0.125, 0.1234567890123], [1, 0.5, 0.25]]))
     assert full.resolution.q.tolist() == [0.0, 0.0]
+
+
+def test_joints_of_a_message_are_all_named_whichever_are_read(tmp_path: Path) -> None:
+    """Their numbers are SI whatever a job says; other files have no message."""
+    states = "".join(
+        f"  - {{positions: [{k}, {k + 0.25}, {k + 0.5}], time_from_start: {{sec: {k}}}}}\n" for k in range(3)
+    )
+    goal = tmp_path / "goal.yaml"
+    goal.write_text(f"joint_names: [a, b, c]\npoints:\n{states}")
+    found = open_motion(goal, joints=("c", "a"), declared=Units(angle="deg"))
+    whole = found.whole()
+    assert (whole.joints, whole.message_joints) == (("c", "a"), ("a", "b", "c"))
+    assert whole.q.tolist() == [[k + 0.5, k] for k in range(3)]
+    rows = written(tmp_path, "t,a_position,b_position", [[0, 1, 2], [1, 1.5, 2.5]])
+    plain = open_motion(rows, joints=("b", "a"), declared=Units(angle="deg")).whole()
+    assert (plain.joints, plain.message_joints) == (("b", "a"), None)
+    assert plain.q[0] == pytest.approx([2 * DEGREE, DEGREE])
+
+
+def test_columns_of_our_own_are_numbered_and_others_go_by_the_names_of_joints(tmp_path: Path) -> None:
+    """Of an arm whose joints are called q2 and q1 the first column is that of the first joint."""
+    ours = open_motion(written(tmp_path, "t,q1,q2", [[0, 1, 2], [1, 3, 4]]), joints=("q2", "q1"))
+    assert (ours.joints, ours.whole().q.tolist()) == (("q2", "q1"), [[1, 2], [3, 4]])
+    others = written(tmp_path, "t,elbow,fan,base", [[0, 1, 7, 2], [1, 3, 7, 4]])
+    found = open_motion(others, joints=("base", "elbow"), units="rad")
+    assert (found.joints, found.whole().q.tolist()) == (("base", "elbow"), [[2, 1], [4, 3]])
+    assert found.unread == ("fan",)
+
+
+def test_an_array_without_names_has_the_joints_that_are_expected_and_units_that_somebody_says(
+    tmp_path: Path,
+) -> None:
+    """Times, and positions, velocities and accelerations of two joints, or positions of six."""
+    rows = np.arange(21.0).reshape(3, 7)
+    np.save(tmp_path / "rows.npy", rows)
+    with pytest.raises(InputError, match="nothing says the unit"):
+        open_motion(tmp_path / "rows.npy", joints=list("abcdef"))
+    six = open_motion(tmp_path / "rows.npy", joints=list("abcdef"), units="rad")
+    assert (six.whole().q.tolist(), six.whole().qd) == (rows[:, 1:].tolist(), None)
+    two = open_motion(tmp_path / "rows.npy", joints=list("ab"), units="rad").whole()
+    assert two.qd is not None
+    assert two.qdd is not None
+    assert np.hstack([two.q, two.qd, two.qdd]).tolist() == rows[:, 1:].tolist()
+
+
+def test_roundings_are_those_of_each_quantity(tmp_path: Path) -> None:
+    rows = [(0, 0.1, 1.0, 0.3), (1, 0.2, 2.0, 0.4)]
+    kinds = [("t", "<f8"), ("q", "<f4", (1,)), ("qd", "<f8", (1,)), ("qdd", "<f4", (1,))]
+    np.save(tmp_path / "rows.npy", np.array(rows, kinds))
+    found = open_motion(tmp_path / "rows.npy", units="rad").resolution.roundings
+    assert [share for _, share in found] == [2.0**-24, 0.0, 2.0**-24]
+    text = written(tmp_path, "t,q1,qd1,qdd1", [[0, "0.10", "1.000", "0.3"], [1, "0.20", "2.000", "0.4"]])
+    found = open_motion(text).resolution.roundings
+    assert [(unit.tolist(), share) for unit, share in found] == [
+        ([pytest.approx(half)], 0.0) for half in (0.005, 0.0005, 0.05)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("names", "largest"),
+    [("t,q1_deg,q2_deg,v1,v2", "7"), ("t,q1,q2,v1,v2", "6"), ("t,q1,q2,v1_deg,v2_deg", "6")],
+)
+def test_the_hint_to_a_unit_looks_at_positions_where_these_lack_one(
+    names: str, largest: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path, names, [[0, 1, -6, 2, 0], [1, 2, 3, -7, 1]])
+    with pytest.raises(InputError, match="nothing says the unit") as caught:
+        open_motion(path)
+    assert f"values up to {largest}: " in (caught.value.problems[0].hint or "")
+
+
+def test_a_wrong_number_is_named_after_its_column_where_others_are_left_out(tmp_path: Path) -> None:
+    path = written(tmp_path, "note,t,fan,q1,q2", [["a", 0, 1, 2, 3], ["b", 1, 1, 2, "-1e101"]])
+    with pytest.raises(InputError, match=r"q2 is -1e\+101 in row 2"):
+        open_motion(path, units="rad")
 
 
 class TestByteSources:
