@@ -14,6 +14,7 @@ from trajcli.job.read import load_job
 from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.streams.reading import holds_motion, is_job, is_ros_message, motion_files, read_table
+from trajcli.streams.recorded_motion import open_motion
 from trajcli.streams.ros_messages import read_ros_yaml
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -54,6 +55,9 @@ def test_a_log_is_known_by_its_first_bytes(plan, tmp_path):
     write_plan(plan, str(tmp_path / "rows.mcap"))
     (tmp_path / "rows.log").write_bytes((tmp_path / "rows.mcap").read_bytes())
     assert read_table(tmp_path / "rows.log").names == read_table(tmp_path / "rows.mcap").names
+    logged = open_motion(tmp_path / "rows.log")
+    assert logged.joints == plan.trajectory.joint_names
+    assert logged.whole().message_joints is None  # it is no goal, of which some joints may be left out
 
 
 def test_a_goal_that_was_written_is_read(plan, tmp_path):
