@@ -15,10 +15,11 @@ from trajcli.job.model import Output, OutputUnits, RobotSource, UnitsSpec
 from trajcli.job.robot import JointModel
 from trajcli.kinematics.robot import MountedTool
 from trajcli.language.dynamics import FrictionSpec, Gravity, LinkSpec, NamedTool, PayloadSpec
-from trajcli.language.efforts import EffortBound, Efforts
 from trajcli.language.limits import (
     UNLIMITED,
     Bounds,
+    EffortBound,
+    Efforts,
     JobLimitsSpec,
     JointBound,
     JointRate,

@@ -16,8 +16,7 @@ from trajcli.errors import Amount, InputError, Problem
 from trajcli.job.model import Job
 from trajcli.job.yaml.load import Document
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, ToolLimits
-from trajcli.language.efforts import OF_ROBOT, EffortBounds
-from trajcli.language.limits import LimitsSpec
+from trajcli.language.limits import OF_ROBOT, EffortBounds, LimitsSpec
 from trajcli.language.numbers import FieldPath
 from trajcli.limits.kinds import JOINT_KINDS, KIND_OF, TOOL_KINDS
 from trajcli.planners.planner import Event

@@ -27,8 +27,7 @@ from trajcli.job.yaml.load import Document, parse_document
 from trajcli.job.yaml.source import STDIN, read_bytes
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
 from trajcli.language.dynamics import FrictionSpec, LinkSpec
-from trajcli.language.efforts import EffortBound
-from trajcli.language.limits import JointBound, VelocityByPosition
+from trajcli.language.limits import EffortBound, JointBound, VelocityByPosition
 from trajcli.language.numbers import (
     MAX_JOINTS,
     NO_TRUTH,

@@ -18,7 +18,7 @@ from trajcli.job.reports.efforts_and_zones import (
     ZoneReport,
 )
 from trajcli.kinematics.robot import QUANTITIES, JointType, Payload, Robot
-from trajcli.language.efforts import OF_ROBOT
+from trajcli.language.limits import OF_ROBOT
 from trajcli.planning.plan import Plan
 from trajcli.units import effort_unit, joint_units
 

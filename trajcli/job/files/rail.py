@@ -24,8 +24,7 @@ from trajcli.job.yaml.document import Document
 from trajcli.kinematics.dh_rows import row_pose
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, LinkInertia, Robot
 from trajcli.language.dynamics import FrictionSpec
-from trajcli.language.efforts import EffortBound
-from trajcli.language.limits import JointBound
+from trajcli.language.limits import EffortBound, JointBound
 from trajcli.language.numbers import MAX_JOINTS, Model, Name, Number, ReadingContext
 from trajcli.language.per_joint import UNLIMITED, LowerUpper
 from trajcli.language.poses import Pose
