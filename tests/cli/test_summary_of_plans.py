@@ -29,7 +29,7 @@ from trajcli.cli.plan import (
 from trajcli.errors import Amount
 from trajcli.findings import Finding
 from trajcli.job.read import load_job
-from trajcli.job.reports.comparisons import PeerViolation, ReferenceReport
+from trajcli.job.report_parts import PeerViolation, ReferenceReport
 from trajcli.output.delivery import joined
 from trajcli.peers import move_reference
 from trajcli.planners.planner import PlannedMove

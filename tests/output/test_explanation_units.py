@@ -14,7 +14,7 @@ from tiers import few
 from trajcli.job.explanation import Explanation
 from trajcli.job.read import job_from_text
 from trajcli.job.report import Report
-from trajcli.job.reports.part import MeasuredIn, ReportPart
+from trajcli.job.report_parts import MeasuredIn, ReportPart
 from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
 from trajcli.planning.plan import plan_job

@@ -8,9 +8,8 @@ from typing import Any, get_args
 
 import pytest
 
-from trajcli.job import explanation, report
-from trajcli.job.reports import comparisons, efforts_and_zones
-from trajcli.job.reports.part import MeasuredIn, ReportPart, in_units
+from trajcli.job import explanation, report, report_parts
+from trajcli.job.report_parts import MeasuredIn, ReportPart, in_units
 from trajcli.units import Units
 
 FACTORS = {"mm": 1e3, "deg": 180 / math.pi}
@@ -69,7 +68,7 @@ OWN_UNITS = {
 
 PARTS: dict[str, type[ReportPart]] = {
     name: kind
-    for module in (report, explanation, comparisons, efforts_and_zones)
+    for module in (report, explanation, report_parts)
     for name, kind in vars(module).items()
     if isinstance(kind, type) and issubclass(kind, ReportPart) and kind.__module__ == module.__name__
 }

@@ -18,7 +18,7 @@ from trajcli.errors import InputError, MissingLimitError
 from trajcli.grids import UniformGrid
 from trajcli.job.dump import dump_job
 from trajcli.job.read import job_from_text
-from trajcli.job.reports.part import in_units
+from trajcli.job.report_parts import in_units
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.output.report import report_of
 from trajcli.planning.plan import Plan, plan_job

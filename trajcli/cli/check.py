@@ -136,7 +136,7 @@ def _view(beside: MotionReference) -> dict[str, Any]:
 
 def _beside(beside: MotionReference, units: Units) -> Iterator[str]:
     from trajcli.cli.plan import violation_lines
-    from trajcli.job.reports.part import in_units
+    from trajcli.job.report_parts import in_units
 
     reference, path = in_units(beside.reference, units), beside.path_reference
     if reference.duration is None:

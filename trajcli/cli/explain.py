@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         Explanation,
     )
     from trajcli.job.report import PeakReport
-    from trajcli.job.reports.comparisons import AtLimitReport, SavingReport
+    from trajcli.job.report_parts import AtLimitReport, SavingReport
     from trajcli.planning.plan import Plan
 
 _MOST_LIMITS = 6  # that bind, in one line

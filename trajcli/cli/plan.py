@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from trajcli.cli.job_commands import PlanCommand
     from trajcli.consumers.profile import Profile
     from trajcli.job.report import MoveReport
-    from trajcli.job.reports.comparisons import PathReferenceReport, PeerViolation, ReferenceReport
+    from trajcli.job.report_parts import PathReferenceReport, PeerViolation, ReferenceReport
     from trajcli.judge.judgement import Judgement
     from trajcli.output.delivery.for_consumer import ForConsumer
     from trajcli.output.delivery.joined_rows import JoinedRows
@@ -269,7 +269,7 @@ def _report(
         report = report.model_copy(update={"consumer": consumer_report(plan, made.rules)})
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
-    from trajcli.job.reports.part import in_units
+    from trajcli.job.report_parts import in_units
 
     compared = options.reference and plan.verdict.passed and not options.quiet
     for move in report.moves if compared else []:

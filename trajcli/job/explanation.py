@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import SerializerFunctionWrapHandler, TypeAdapter, model_serializer
 
 from trajcli.job.report import MoveReport, OutsideReport, Report, WaypointReport
-from trajcli.job.reports.part import MeasuredIn, ReportPart, UnitName, described
+from trajcli.job.report_parts import MeasuredIn, ReportPart, UnitName, described
 
 Vector = list[float]
 MoveSeconds = Annotated[float, described("Seconds from the start of the move.")]

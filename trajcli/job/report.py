@@ -10,27 +10,23 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from trajcli.job.reports.comparisons import (
+from trajcli.job.report_parts import (
     AtLimitReport,
     ConsumerReport,
-    PathReferenceReport,
-    ReferenceReport,
-    SavingReport,
-)
-from trajcli.job.reports.efforts_and_zones import (
     EffortReport,
     EffortsReport,
     FlyByReport,
-    MountedToolReport,
-    PayloadReport,
-    SignalReport,
-)
-from trajcli.job.reports.part import (
     InSi,
     JointQuantity,
     MeasuredIn,
+    MountedToolReport,
+    PathReferenceReport,
+    PayloadReport,
+    ReferenceReport,
     ReportPart,
     ReportSeconds,
+    SavingReport,
+    SignalReport,
     TrajectorySeconds,
     UnitName,
     described,

@@ -15,7 +15,7 @@ from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob
-from trajcli.job.reports.comparisons import ConsumerFinding, ConsumerReport, UnjudgedRule
+from trajcli.job.report_parts import ConsumerFinding, ConsumerReport, UnjudgedRule
 from trajcli.output.write import write_rows
 from trajcli.planning.plan import Plan
 from trajcli.progress import report_progress

@@ -30,7 +30,7 @@ from trajcli.job.explanation import (
     WeaveReport,
 )
 from trajcli.job.report import MoveReport, WaypointReport
-from trajcli.job.reports.part import in_units
+from trajcli.job.report_parts import in_units
 from trajcli.kinematics.robot import Robot
 from trajcli.output.polynomials import blends_of, knots_of, polynomial_intervals, polynomials_of
 from trajcli.output.report import report_of

@@ -18,7 +18,7 @@ from trajcli.columns import joint_factors
 from trajcli.curves.piecewise import Array, derivative_coefficients, taylor_shift
 from trajcli.geometry.rotation import Flags
 from trajcli.job.explanation import BlendReport, KnotReport, PolynomialReport, polynomial_reports
-from trajcli.job.reports.part import in_units
+from trajcli.job.report_parts import in_units
 from trajcli.planners.planner import Phase, PlannedMove
 from trajcli.units import Units, joint_units
 

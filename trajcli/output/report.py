@@ -36,8 +36,7 @@ from trajcli.job.report import (
     UncheckedToolReport,
     WaypointReport,
 )
-from trajcli.job.reports.comparisons import AtLimitReport
-from trajcli.job.reports.efforts_and_zones import FlyByReport, SignalReport
+from trajcli.job.report_parts import AtLimitReport, FlyByReport, SignalReport
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.planners.planner import Event, PlannedMove

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 from trajcli.job.report import MoveReport, Report
-from trajcli.job.reports.comparisons import SavingReport
-from trajcli.job.reports.efforts_and_zones import (
+from trajcli.job.report_parts import (
     BoundReport,
     EffortReport,
     EffortsReport,
     FlyByReport,
     MountedToolReport,
     PayloadReport,
+    SavingReport,
     ZoneReport,
 )
 from trajcli.kinematics.robot import QUANTITIES, JointType, Payload, Robot

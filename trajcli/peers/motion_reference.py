@@ -10,7 +10,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.errors import PlanningError
 from trajcli.frozen import frozen
-from trajcli.job.reports.comparisons import PathReferenceReport, ReferenceReport
+from trajcli.job.report_parts import PathReferenceReport, ReferenceReport
 from trajcli.judge.judgement import Judgement, worst_first
 from trajcli.kinematics.robot import Robot
 from trajcli.peers.lower_bound import NoBound, fastest_duration

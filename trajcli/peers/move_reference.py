@@ -9,7 +9,7 @@ import numpy as np
 
 from trajcli.errors import PlanningError
 from trajcli.findings import Finding
-from trajcli.job.reports.comparisons import (
+from trajcli.job.report_parts import (
     LimitUseReport,
     PathReferenceReport,
     PeerViolation,

@@ -1,1 +1,0 @@
-"""Parts of the report that several of its models share."""
