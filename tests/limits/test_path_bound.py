@@ -22,7 +22,7 @@ from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.limits import path_bound
+from trajcli.limits import tool_bound
 from trajcli.trajectory import Span, Trajectory, resting
 
 ROBOT, Q = load_robot("ur5e"), np.array([0.3, -1.2, 1.4, -0.9, -1.3, 0.4])
@@ -137,7 +137,7 @@ def test_what_comes_not_near_enough_to_its_values_is_not_proven(monkeypatch: pyt
         PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[REST]]])),
     )
     assert most(moving)[1] is not None
-    monkeypatch.setattr(path_bound, "_HALVINGS", 0)
+    monkeypatch.setattr(tool_bound, "_HALVINGS", 0)
     assert tool(moving.trajectory.curve, moving.motion.law).bounds == (None, None)
 
 
@@ -147,7 +147,7 @@ def test_what_is_proven_is_within_two_thousandths_of_the_tolerance(monkeypatch: 
     rows[-1, 0], rows[0, 0, 0], rows[1, 0, 0] = Q, -1.0, 1.5
     joints = PiecewisePolynomial(np.array([0.0, 1.0]), rows)
     resting = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[REST]]]))
-    monkeypatch.setattr(path_bound, "_HALVINGS", 2)
+    monkeypatch.setattr(tool_bound, "_HALVINGS", 2)
     proven = []
     for tolerance in 10.0 ** np.arange(-12, 4):
         bounds = tool(joints, resting, tolerances=(tolerance, tolerance)).bounds
@@ -283,7 +283,7 @@ def test_a_piece_that_rounding_begins_before_a_border_is_of_the_segment_behind()
     coefficients = np.zeros((2, 1, 7))
     coefficients[1, 0] = [*Q, 0.1 * (1 - 1e-15)]
     coefficients[0, 0, -1] = 0.1
-    found = path_bound._of_path(path, np.array([1.0]), coefficients)[0, 9, 0]
+    found = tool_bound._of_path(path, np.array([1.0]), coefficients)[0, 9, 0]
     assert found * math.factorial(9) == pytest.approx(radius * (0.1 / radius) ** 9, rel=1e-9)
 
 
@@ -350,7 +350,7 @@ def test_joints_that_turn_together_turn_the_tool_by_their_sum() -> None:
     coefficients = np.zeros((2, 1, 7))
     coefficients[0, 0, 1:4], coefficients[1, 0, :6] = 2.0, Q
     path = ToolPath(line(), WHOLE, "all")
-    _, ((_, highest),) = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
+    _, ((_, highest),) = tool_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
     assert math.sqrt(1.5) * (1 - 1e-12) <= highest * math.factorial(9) / 6.0**9 <= 100.0
 
 
@@ -361,14 +361,14 @@ def test_a_slide_is_as_long_as_it_stands() -> None:
     coefficients = np.zeros((2, 1, 3))
     coefficients[0, 0, 0], coefficients[1, 0] = 2.0, [0.3, 5.0, REST]
     path = ToolPath(line(), WHOLE, "none")
-    _, ((highest, _),) = path_bound._values_at_nodes(polar, path, coefficients, np.array([1e-6]))
+    _, ((highest, _),) = tool_bound._values_at_nodes(polar, path, coefficients, np.array([1e-6]))
     assert 1 - 1e-12 <= highest * math.factorial(9) / (5.0 * 2.0**9) <= 10.0
     each = np.repeat(coefficients, 3, axis=1)
     each[1, :, 1] = [0.5, 5.0, 1.0]
-    _, highest = path_bound._values_at_nodes(polar, path, each, np.full(3, 1e-6))
+    _, highest = tool_bound._values_at_nodes(polar, path, each, np.full(3, 1e-6))
     assert highest[1, 0] * math.factorial(9) / (5.0 * 2.0**9) >= 1 - 1e-12  # in whichever piece
     coefficients[0, 0, :2] = [0.0, 2.0]  # and what slides turns nothing
-    _, ((_, highest),) = path_bound._values_at_nodes(
+    _, ((_, highest),) = tool_bound._values_at_nodes(
         polar, replace(path, orientation="all"), coefficients, np.array([1e-6])
     )
     assert highest == 0.0
@@ -381,13 +381,13 @@ def test_what_hides_between_nodes_is_bounded_by_no_less_than_it_is(orientation: 
     coefficients = np.zeros((2, 1, 7))
     coefficients[0, 0, joint], coefficients[1, 0, :6] = rate, Q
     path = ToolPath(line(), WHOLE, orientation)  # type: ignore[arg-type]
-    _, ((_, highest),) = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
+    _, ((_, highest),) = tool_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
     columns = (
         math.sqrt(1.5) if orientation == "all" else 1.0
     )  # of three columns, each as long as the largest may be
     assert columns * (1 - 1e-12) <= highest * math.factorial(9) / rate**9 <= 100.0
     t = np.arange(9) * 0.2
-    values, _ = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([t[-1]]))
+    values, _ = tool_bound._values_at_nodes(ROBOT, path, coefficients, np.array([t[-1]]))
     apart = np.linalg.norm(np.diff(values[0, :, 1], axis=0), axis=-1)
     np.testing.assert_allclose(apart, 2 * np.sin(rate * 0.2 / 2), rtol=1e-9)  # a chord, as of the angle
 
@@ -469,7 +469,7 @@ def test_ninth_derivatives_are_bounded_where_a_piece_is_fastest(length: float) -
         rows = coefficients.copy()
         rows[0, 0, joint] = 3.0 / length**4
         path = ToolPath(line(), WHOLE, orientation)  # type: ignore[arg-type]
-        _, ((far, turned),) = path_bound._values_at_nodes(ROBOT, path, rows, lengths)
+        _, ((far, turned),) = tool_bound._values_at_nodes(ROBOT, path, rows, lengths)
         assert true <= turned <= 10.0 * true
         if joint == 0:
             lever = float(np.hypot(*POSE[:2, 3]))
@@ -478,7 +478,7 @@ def test_ninth_derivatives_are_bounded_where_a_piece_is_fastest(length: float) -
     arc = Arc.through(*(0.1 * each for each in circle))
     path = ToolPath(PoseCurve(arc, FixedOrientation(POSE[:3, :3], arc.length)), WHOLE, "all")
     coefficients[0, 0, -1] = 0.3 / length**4
-    assert 0.1 * true <= path_bound._of_path(path, lengths, coefficients)[0, 9, 0] <= 1.0 * true
+    assert 0.1 * true <= tool_bound._of_path(path, lengths, coefficients)[0, 9, 0] <= 1.0 * true
 
 
 def test_a_tool_that_turns_against_its_path_differs_by_both() -> None:
@@ -487,7 +487,7 @@ def test_a_tool_that_turns_against_its_path_differs_by_both() -> None:
     coefficients = np.zeros((2, 1, 7))
     coefficients[0, 0, 5:], coefficients[1, 0] = [rate, -rate], [*Q, REST]
     path = ToolPath(turning(), WHOLE, "all")
-    _, ((_, highest),) = path_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
+    _, ((_, highest),) = tool_bound._values_at_nodes(ROBOT, path, coefficients, np.array([1e-6]))
     assert 2.0 <= highest * math.factorial(9) / rate**9 <= 2.5
 
 

@@ -13,6 +13,7 @@ from tiers import few
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.kinematics.zone import Zone, ZoneAround
+from trajcli.planners.course import joint_line
 from trajcli.planners.flying_by.between_stops import (
     CornerZone,
     _inside,
@@ -21,7 +22,6 @@ from trajcli.planners.flying_by.between_stops import (
     shared,
     with_looser_limits,
 )
-from trajcli.planners.joint_course import joint_line
 
 QUANTITIES = ("velocity", "acceleration", "jerk")
 

@@ -18,8 +18,7 @@ from trajcli.job.read import job_from_text
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Limits, ToolLimits
-from trajcli.planners.course import Course, PathRates, law_bounds
-from trajcli.planners.joint_course import JointCourse, joint_line
+from trajcli.planners.course import Course, JointCourse, PathRates, joint_line, law_bounds
 from trajcli.planners.tool_constraint import ToolJerkConstraint
 from trajcli.planners.tool_path.course import ToolCourse
 from trajcli.planning.plan import plan_job

@@ -18,12 +18,12 @@ from trajcli.findings import Finding
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits
 from trajcli.kinematics.zone import Zone, ZoneAround
+from trajcli.planners.course import JointCourse
 from trajcli.planners.flying_by import within_limits
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.flown_parts import CourseLaws, FlownPart
 from trajcli.planners.flying_by.motion_search import POWERS, with_shares
 from trajcli.planners.flying_by.within_limits import FlownChain, flown, straightened
-from trajcli.planners.joint_course import JointCourse
 from trajcli.trajectory import State, resting
 
 BOUNDS = {"velocity": 3.0, "acceleration": 8.0, "jerk": 60.0}

@@ -16,6 +16,7 @@ from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.errors import PlanningError
 from trajcli.kinematics.robot import ToolLimits
+from trajcli.planners.course import JointCourse
 from trajcli.planners.flying_by import flown_parts as parts_module
 from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import (
@@ -24,7 +25,6 @@ from trajcli.planners.flying_by.flown_parts import (
     NoLawError,
     along_path,
 )
-from trajcli.planners.joint_course import JointCourse
 
 
 def states(*rows: tuple[float, float]) -> np.ndarray:

@@ -13,9 +13,9 @@ from ruckig import InputParameter, Result, Ruckig, Trajectory
 from tiers import few
 
 from trajcli.job.read import job_from_text
+from trajcli.planners.course import JointCourse, joint_line
 from trajcli.planners.flying_by import flown_parts
 from trajcli.planners.flying_by.flown_parts import CourseLaws, FlownPart, along_path
-from trajcli.planners.joint_course import JointCourse, joint_line
 
 JERK, CHANGE, SPEED = 40.0, 12.0, 3.0
 SHORT = np.array([0.2, -1.7, 1.8, -1.6, -1.5, 0.1]), np.array([0.31, -1.62, 1.74, -1.57, -1.52, 0.05])

@@ -15,6 +15,7 @@ from tiers import few
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.errors import PlanningError
 from trajcli.kinematics.robot import Payload
+from trajcli.planners.course import JointCourse
 from trajcli.planners.flying_by import flown_parts as parts_module
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.flown_parts import (
@@ -30,7 +31,6 @@ from trajcli.planners.flying_by.flown_parts import (
 )
 from trajcli.planners.flying_by.motion_search import with_shares
 from trajcli.planners.flying_by.row import row_of
-from trajcli.planners.joint_course import JointCourse
 
 
 def ruckig_of(first: np.ndarray, last: np.ndarray, bounds: np.ndarray) -> Trajectory:

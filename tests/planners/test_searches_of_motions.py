@@ -14,13 +14,13 @@ from planners.test_chains_within_limits import POINTS, WAYS, arm, line, zone_at
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
 from trajcli.errors import PlanningError
 from trajcli.findings import Finding
+from trajcli.planners.course import JointCourse
 from trajcli.planners.flying_by import motion_search
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.chain_parts import PathPart
 from trajcli.planners.flying_by.flown_parts import CourseLaws, FlownPart, NoLawError
 from trajcli.planners.flying_by.motion_search import MotionSearch, with_shares
 from trajcli.planners.flying_by.search import FoundStates
-from trajcli.planners.joint_course import JointCourse
 
 POWERS = np.array([1, 2, 3])
 REST = np.zeros(2)

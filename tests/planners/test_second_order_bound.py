@@ -14,9 +14,9 @@ from tiers import few
 
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.robot import Limits, Robot
+from trajcli.planners.course import joint_line
 from trajcli.planners.flying_by import second_order_bound
 from trajcli.planners.flying_by.second_order import CoursePart, ZonePassage, course_part
-from trajcli.planners.joint_course import joint_line
 from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.plan import Plan, plan_job
 

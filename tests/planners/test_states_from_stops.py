@@ -12,11 +12,11 @@ import pytest
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.robot import Limits
 from trajcli.kinematics.zone import Zone, ZoneAround
+from trajcli.planners.course import joint_line
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.flown_parts import CourseLaws
 from trajcli.planners.flying_by.motion_search import POWERS, with_shares
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
-from trajcli.planners.joint_course import joint_line
 
 POINTS = np.array([[0.3, 1.2], [0.9, 1.25], [1.0, 2.0], [0.4, 2.4]])
 FAST = np.array([[0.0, 0.0], [2.0, -3.0], [1.9, 4.0], [1.8, -5.0], [1.7, 2.5], [0.0, 0.0]])

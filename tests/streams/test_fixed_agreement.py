@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from tiers import few
 
-from trajcli.streams.decimals import encode_fixed
-from trajcli.streams.fixed_agreement import FixedLayout
+from trajcli.streams.decimals import FixedLayout, encode_fixed
 
 
 def rows_of(scale, count=700):

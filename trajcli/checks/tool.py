@@ -18,10 +18,9 @@ from trajcli.kinematics.inverse.target import IkTarget, determinants, residuals
 from trajcli.kinematics.jacobian import linearisation
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import SPEED_KINDS, LimitedMove
-from trajcli.limits.path_bound import path_bounds
 from trajcli.limits.tolerances import PATH_RELATIVE, TOOL_RELATIVE, exceeds
 from trajcli.limits.tool import peaks_in, tool_excess
-from trajcli.limits.tool_bound import SpeedRun, ToolPeak, speed_runs
+from trajcli.limits.tool_bound import SpeedRun, ToolPeak, path_bounds, speed_runs
 from trajcli.trajectory import Span, Trajectory
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Parts of a report: comparisons, efforts, loads, zones; numbers that know their unit, and that of the job."""
+"""Parts of a report: comparisons, efforts, loads, zones; numbers that know their unit, in those of a job."""
 
 from __future__ import annotations
 

@@ -144,6 +144,19 @@ class VelocityByPosition(Model):
     ] = 0.0
 
 
+def _by_joint(
+    value: Any,  # noqa: ANN401
+    context: ReadingContext,
+    read_one: Callable[[Any, int], LowerUpper],
+) -> tuple[LowerUpper | None, ...]:
+    """Return the bound of each joint, None where it is left out; none at all where all are."""
+    try:
+        bounds = read_per_joint(value, context, read_one, None)
+    except FlawError as error:
+        raise with_pair_hint(error, value) from None
+    return bounds if any(bound is not None for bound in bounds) else ()
+
+
 @comparable
 class Bounds(FieldType):
     """One bound for all joints, a list, or a mapping by joint name; None where a joint is left out."""
@@ -157,11 +170,7 @@ class Bounds(FieldType):
         def read_one(item: Any, joint: int) -> LowerUpper:  # noqa: ANN401
             return read_bound(item, context.joint_quantity(joint, self.order), context)
 
-        try:
-            bounds = read_per_joint(value, context, read_one, None)
-        except FlawError as error:
-            raise with_pair_hint(error, value) from None
-        return bounds if any(bound is not None for bound in bounds) else ()
+        return _by_joint(value, context, read_one)
 
     def write(self, value: tuple[LowerUpper | None, ...], context: ReadingContext) -> dict[str, Any]:
         """Return the bounds by joint name; without names, nothing can be written."""
@@ -247,11 +256,7 @@ class Efforts(FieldType):
             types = context.joint_types
             return read_effort(item, types[joint] if joint < len(types) else None)
 
-        try:
-            bounds = read_per_joint(value, context, read_one, None)
-        except FlawError as error:
-            raise with_pair_hint(error, value) from None
-        return bounds if any(bound is not None for bound in bounds) else ()
+        return _by_joint(value, context, read_one)
 
     def write(self, value: EffortBounds, context: ReadingContext) -> dict[str, Any] | str:
         """Return the bounds by joint name."""

@@ -109,7 +109,7 @@ class _RowsReadBack:
     def skip(self, block: Array) -> bool:
         """Return whether the next rows are surely those of `block`; then they are taken."""
         # whoever writes to standard output does not pay for the import
-        from trajcli.streams.fixed_agreement import FixedLayout
+        from trajcli.streams.decimals import FixedLayout
 
         if self._stream.tell() == 0:
             self._expect_names()

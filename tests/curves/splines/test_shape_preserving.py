@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from spline_laws import SEEDS, assert_through, uneven_times
 
-from trajcli.curves.splines.shape_preserving import ShapeError, shape_preserving
+from trajcli.curves.splines.hermite import ShapeError, shape_preserving
 
 
 def random_points(seed, count, ratio):

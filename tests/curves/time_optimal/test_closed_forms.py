@@ -11,7 +11,7 @@ from topp_paths import SpeedCap, assert_motion, polyline, spline, symmetric
 from yaml_files import read_yaml
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.curves.splines.shape_preserving import shape_preserving
+from trajcli.curves.splines.hermite import shape_preserving
 from trajcli.curves.time_optimal.parameterization import time_optimal
 
 CASES = read_yaml(Path(__file__).parents[2] / "oracles" / "time_optimal.yaml")["cases"]

@@ -10,7 +10,7 @@ from topp_paths import polyline, random_bounds, spline, symmetric
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal.parameterization import time_optimal
-from trajcli.curves.time_optimal.switching import switching_structure
+from trajcli.curves.time_optimal.phase_plane import switching_structure
 
 
 def listed(found):

@@ -9,8 +9,7 @@ from product_of_rows import difference_jacobian, pose_of
 from tiers import few
 
 from trajcli.errors import InputError
-from trajcli.kinematics.calibration.identifiability import _reduced, identifiability
-from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
+from trajcli.kinematics.calibration.identifiability import _reduced, identifiability, identification_jacobian
 from trajcli.kinematics.calibration.parameters import (
     ArmParameter,
     all_parameters,

@@ -11,7 +11,7 @@ from product_of_rows import difference_jacobian, pose_of
 from tiers import few
 
 from trajcli.geometry.rotation import log
-from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
+from trajcli.kinematics.calibration.identifiability import identification_jacobian
 from trajcli.kinematics.calibration.parameters import (
     ROW,
     ArmParameter,

@@ -11,11 +11,11 @@ from trajcli.geometry.rotation import exp
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for, poses_for_the_others, without_last_joint
-from trajcli.kinematics.inverse.link_products import poses_and_jacobians
 from trajcli.kinematics.inverse.numeric import search
 from trajcli.kinematics.inverse.self_motion import nearest_on_self_motions
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.kinematics.inverse.target import pose_target
+from trajcli.kinematics.jacobian import poses_and_jacobians
 from trajcli.kinematics.robot import Joint, Robot
 
 PANDA = load_robot("panda")

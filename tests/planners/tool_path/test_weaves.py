@@ -16,7 +16,7 @@ from trajcli.geometry.paths.position import Line
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.following.weave import Weave
 from trajcli.limits.kinds import LimitedMove
-from trajcli.limits.path_bound import path_bounds
+from trajcli.limits.tool_bound import path_bounds
 from trajcli.output.explain import explanation
 
 HERE = {"xyz": [0.4, -0.1, 0.3], "rpy": DOWN}

@@ -17,7 +17,7 @@ from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
 from trajcli.errors import PlanningError
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.planners import joint_course
+from trajcli.planners import course
 from trajcli.planners.law_events import distance_from_bound
 from trajcli.planners.waypoints import fastest_law
 from trajcli.planners.waypoints.fastest_law import (
@@ -65,7 +65,7 @@ def asks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fastest_law, "solved_within_efforts", lambda curve, robot, solve: solve(("effort",)))
     monkeypatch.setattr(fastest_law, "path_constraints", lambda curve, robot: ("path",))
     tool = SimpleNamespace(constraints=lambda curve: ("tool", "path"), jerk_constraints=("jerk of the tool",))
-    monkeypatch.setattr(joint_course, "JointCourse", lambda curve, robot: tool)
+    monkeypatch.setattr(course, "JointCourse", lambda curve, robot: tool)
 
 
 def asked(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
+from trajcli.kinematics.calibration.identifiability import identification_jacobian
 from trajcli.kinematics.calibration.parameters import ArmParameter
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, residual_jacobian, residuals

@@ -22,8 +22,11 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
-from trajcli.kinematics.calibration.identifiability import Identifiability, identifiability
-from trajcli.kinematics.calibration.identification_jacobian import identification_jacobian
+from trajcli.kinematics.calibration.identifiability import (
+    Identifiability,
+    identifiability,
+    identification_jacobian,
+)
 from trajcli.kinematics.calibration.measurements import MeasuredKind, Measurements
 from trajcli.kinematics.calibration.parameters import ArmParameter, units_of
 from trajcli.kinematics.forward import forward

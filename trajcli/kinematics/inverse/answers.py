@@ -13,6 +13,7 @@ from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.method import Branch, IkMethod
 from trajcli.kinematics.inverse.target import IkTarget, closure_of
+from trajcli.kinematics.jacobian import FEW, poses_and_jacobians
 from trajcli.kinematics.robot import Robot
 
 _EXACT = 1e-14  # m and rad: nothing is left to take away
@@ -82,12 +83,10 @@ def closures(robot: Robot, target: IkTarget, joints: Array) -> Array:
     count, branches, poses = joints.shape
     repeated = target.rows(np.tile(np.arange(poses), branches))
     values = joints.reshape(count, -1).T
-    poses_there = None
-    if count > target.coordinates:
-        from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
-
-        poses_there = poses_and_jacobians(robot, values)[0] if len(values) <= FEW else None
-    poses_there = forward(robot, values) if poses_there is None else poses_there
+    if count > target.coordinates and len(values) <= FEW:
+        poses_there = poses_and_jacobians(robot, values)[0]
+    else:
+        poses_there = forward(robot, values)
     closure = closure_of(repeated, poses_there)
     return closure.T.reshape(2, branches, poses).copy()
 

@@ -20,9 +20,8 @@ from trajcli.kinematics.inverse.families.choose import method_for, poses_for_the
 from trajcli.kinematics.inverse.families.method import IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns
-from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
 from trajcli.kinematics.inverse.target import IkTarget
-from trajcli.kinematics.jacobian import linearisation
+from trajcli.kinematics.jacobian import poses_and_jacobians
 from trajcli.kinematics.robot import Robot
 
 _SAMPLES = 72  # of the last joint: five degrees apart at most
@@ -223,8 +222,7 @@ class _Slide:
 
     def _local(self, wanted: Array, q: Array) -> tuple[Array, Array, Array]:
         """Return the largest scaled errors (K,), corrections and unit null vectors (K, n)."""
-        compute = poses_and_jacobians if len(q) <= FEW else linearisation
-        poses, slopes = compute(self._robot, q)
+        poses, slopes = poses_and_jacobians(self._robot, q)
         turned = wanted[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2)
         errors = np.empty((len(q), 6))
         errors[:, :3] = (wanted[:, :3, 3] - poses[:, :3, 3]) / self._length

@@ -30,9 +30,8 @@ from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.joint_turns import FULL, revolute
-from trajcli.kinematics.inverse.link_products import FEW, poses_and_jacobians
 from trajcli.kinematics.inverse.target import IkTarget, closure_of, residual_jacobian, residuals
-from trajcli.kinematics.jacobian import linearisation
+from trajcli.kinematics.jacobian import poses_and_jacobians
 from trajcli.kinematics.robot import Robot
 
 SEEDS = 64  # where any point of a manifold will do
@@ -62,7 +61,7 @@ class SearchResult:
 
 def linearised(robot: Robot, target: IkTarget, q: Array) -> tuple[Array, Array]:
     """Return scaled residuals (K, m) and their Jacobian (K, m, n) at joint values (K, n)."""
-    poses, whole = poses_and_jacobians(robot, q) if len(q) <= FEW else linearisation(robot, q)
+    poses, whole = poses_and_jacobians(robot, q)
     errors, slopes = residuals(target, poses), residual_jacobian(target, poses, whole)
     scale = np.ones(errors.shape[1])
     scale[: sum(target.position)] = 1.0 / characteristic_length(robot)

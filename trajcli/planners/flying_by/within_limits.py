@@ -22,11 +22,10 @@ from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.kinematics.zone import Zone, ZoneAround
 from trajcli.planners.boundary_states import missing_limit
-from trajcli.planners.course import Course
+from trajcli.planners.course import Course, joint_line
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
 from trajcli.planners.flying_by.flown_parts import CourseLaws, FlownPart, findings_of
 from trajcli.planners.flying_by.motion_search import POWERS, MotionSearch, duration_of, with_shares
-from trajcli.planners.joint_course import joint_line
 from trajcli.planners.planner import PlannedMove
 from trajcli.trajectory import State
 

@@ -99,7 +99,7 @@ class JerkLimited(PointToPoint):
 
     def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
         """Return the straight line in joint space to the target."""
-        from trajcli.planners.joint_course import joint_line
+        from trajcli.planners.course import joint_line
 
         return joint_line(start, np.array(self.to.joints), robot)
 

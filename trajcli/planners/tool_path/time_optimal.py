@@ -18,8 +18,7 @@ from trajcli.curves.third_order.jerk import LawJerkConstraint, ThirdOrderConstra
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion, jerk_limited_time_optimal
 from trajcli.curves.time_optimal.constraints import JointConstraint, PathConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, time_optimal
-from trajcli.curves.time_optimal.phase_plane import PhasePlane
-from trajcli.curves.time_optimal.switching import switching_structure
+from trajcli.curves.time_optimal.phase_plane import PhasePlane, switching_structure
 from trajcli.kinematics.following.motion import motion_along
 from trajcli.kinematics.following.tolerance import Tolerance, probes
 from trajcli.kinematics.following.tool_path import SpeedLimits
@@ -122,7 +121,7 @@ def jerk_constraints(
     if math.isfinite(along) and first[:, :3].any():
         found.append(LawJerkConstraint(along))
     if np.isfinite(of_tool).any():
-        from trajcli.planners.joint_course import ToolOfJoints
+        from trajcli.planners.course import ToolOfJoints
 
         found.append(ToolJerkConstraint(ToolOfJoints(curve, robot), of_tool))
     return tuple(found)

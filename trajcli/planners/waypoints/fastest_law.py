@@ -111,7 +111,7 @@ def _further(
     """Return what limits laws along a path besides the rates of joints, and what limits their jerk."""
     if not of_tool:
         return path_constraints(curve, robot), ()
-    from trajcli.planners.joint_course import JointCourse
+    from trajcli.planners.course import JointCourse
 
     course = JointCourse(curve, robot)
     return course.constraints(curve), course.jerk_constraints

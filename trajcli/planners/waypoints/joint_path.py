@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from trajcli.curves.parabolic_blends.blends import blended
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.curves.splines.cubic import not_a_knot
-from trajcli.curves.splines.hermite import parabola_velocities
-from trajcli.curves.splines.shape_preserving import ShapeError
+from trajcli.curves.splines.hermite import ShapeError, parabola_velocities
 from trajcli.curves.third_order.curved_paths import BESIDE, rounded_polyline
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import frozen

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.curves.splines.shape_preserving import ShapeError
+from trajcli.curves.splines.hermite import ShapeError
 from trajcli.curves.splines.virtual_points import virtual_points
 from trajcli.errors import Amount, PlanningError, Problem
 from trajcli.kinematics.robot import Robot

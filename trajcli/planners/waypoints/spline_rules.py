@@ -20,8 +20,8 @@ from trajcli.curves.splines.hermite import (
     cubic_through,
     parabola_velocities,
     quintic_through,
+    shape_preserving,
 )
-from trajcli.curves.splines.shape_preserving import shape_preserving
 from trajcli.curves.splines.time_allocation import CurveFamily, DensePoints, fastest_durations
 from trajcli.curves.splines.virtual_points import continuous_acceleration
 from trajcli.errors import Amount, Amounts, PlanningError, Problem

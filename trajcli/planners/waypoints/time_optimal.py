@@ -15,8 +15,7 @@ from trajcli.curves.operations import scale_time, times_at
 from trajcli.curves.third_order.parameterization import JerkLimitedMotion
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
-from trajcli.curves.time_optimal.phase_plane import PhasePlane
-from trajcli.curves.time_optimal.switching import switching_structure
+from trajcli.curves.time_optimal.phase_plane import PhasePlane, switching_structure
 from trajcli.errors import Amount, Amounts, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
@@ -187,8 +186,7 @@ class TimeOptimal(ThroughPoints):
 
     def course(self, start: Array, robot: Robot, planned: Planned) -> Course:
         """Return the path through the points, from joint values (n,)."""
-        from trajcli.planners.course import PassedPoints
-        from trajcli.planners.joint_course import JointCourse
+        from trajcli.planners.course import JointCourse, PassedPoints
 
         del planned
         points = self._untimed().waypoints(resting(start), robot)

@@ -122,8 +122,7 @@ class FastestThroughPoints(PointSequence):
         Raises:
             PlanningError: When it starts in motion.
         """
-        from trajcli.planners.course import PassedPoints
-        from trajcli.planners.joint_course import JointCourse
+        from trajcli.planners.course import JointCourse, PassedPoints
         from trajcli.planners.waypoints.joint_path import path_of_motion
 
         del start
