@@ -12,8 +12,8 @@ from pathlib import Path
 from docs.markdown import ROOT
 from docs.stills import still_of
 from trajcli.job.read import load_job
+from trajcli.planning.binding_limits import tightest_limit
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.planning.tightest import tightest_limit
 from trajcli.player.page import page_of
 from trajcli.player.scene import scene_of_plan
 

@@ -19,7 +19,7 @@ from trajcli.cli.frames import render_problem
 from trajcli.cli.terminal import fitted_table, is_coloured
 from trajcli.errors import Place, Problem
 from trajcli.output.report import report_of
-from trajcli.planning.tightest import tightest_limit, tightest_of_moves
+from trajcli.planning.binding_limits import tightest_limit, tightest_of_moves
 from trajcli.progress import listening
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*m|\r\x1b\[2K")

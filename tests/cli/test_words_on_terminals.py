@@ -158,7 +158,7 @@ def lines_of(
     name: str | None = None,
 ) -> list[str]:
     found = [tight(each, uses[each.index], name) for each in spans if each.index in uses]
-    monkeypatch.setattr("trajcli.planning.tightest.tightest_of_moves", lambda plan: found)
+    monkeypatch.setattr("trajcli.planning.binding_limits.tightest_of_moves", lambda plan: found)
     plan: Any = SimpleNamespace(trajectory=SimpleNamespace(spans=spans))
     return list(tightest_lines(plan, Terminal()))
 

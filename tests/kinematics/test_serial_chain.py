@@ -7,8 +7,7 @@ from conventions import in_convention
 from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
-from trajcli.kinematics.forward import forward, link_poses
-from trajcli.kinematics.serial_chain import MovingFrame, configurations
+from trajcli.kinematics.forward import MovingFrame, configurations, forward, link_poses
 
 ARMS = pytest.mark.parametrize("arm", oracle.robots(), ids=lambda arm: arm["id"])
 OTHER = {"standard": "modified", "modified": "standard"}

@@ -158,7 +158,7 @@ def test_findings_of_other_moves_are_left_out() -> None:
 def test_higher_limits_are_tried_in_the_moves_that_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[list[int]] = []
     monkeypatch.setattr(
-        "trajcli.planning.sensitivity.savings_of", lambda plan, moves: tried.append([*moves]) or iter(())
+        "trajcli.planning.binding_limits.savings_of", lambda plan, moves: tried.append([*moves]) or iter(())
     )
     explanation(planned(), move=1, sensitivity=True)
     explanation(planned(), sensitivity=True)

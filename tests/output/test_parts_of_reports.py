@@ -22,8 +22,8 @@ from trajcli.output.report_parts import (
     payload_report,
     with_savings,
 )
+from trajcli.planning.binding_limits import Saving
 from trajcli.planning.plan import plan_job
-from trajcli.planning.sensitivity import Saving
 
 NONE = np.tile([-np.inf, np.inf], (2, 1))
 
@@ -190,7 +190,7 @@ def test_savings_of_moves_add_up_the_largest_first(monkeypatch: pytest.MonkeyPat
         Saving(2, 1, 2, None, "no motion was found"),
         Saving(2, 0, 3, -1e-9),
     ]
-    monkeypatch.setattr("trajcli.planning.sensitivity.savings_of", lambda plan, moves: iter(found))
+    monkeypatch.setattr("trajcli.planning.binding_limits.savings_of", lambda plan, moves: iter(found))
     report = with_savings(report_of(plan), plan, [0, 2])
     own = [[(s.joint, s.quantity, s.saved, s.share) for s in move.savings or ()] for move in report.moves]
     assert own[0] == [

@@ -145,8 +145,8 @@ def test_a_refusal_of_toppra_is_said(monkeypatch):
 
 
 def test_the_command_prints_both(capfd):
-    from trajcli.cli.gate import run_plan
     from trajcli.cli.job_commands import PlanCommand
+    from trajcli.cli.plan import run_plan
 
     run_plan(PlanCommand(job=str(EXAMPLES / "time_optimal.yaml"), reference=True, no_output=True))
     err = capfd.readouterr().err

@@ -13,8 +13,8 @@ import trajcli
 from trajcli.curves.approach import ApproachLimits, durations_at_limit
 from trajcli.curves.extrema import durations_above
 from trajcli.job.read import job_from_text
+from trajcli.planning.binding_limits import NEAR, RAISED, raised, savings_of, times_at_limits
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.planning.sensitivity import NEAR, RAISED, raised, savings_of, times_at_limits
 
 
 def planned(move: dict[str, Any], limits: dict[str, Any], joints: int = 1, **more: Any) -> Plan:

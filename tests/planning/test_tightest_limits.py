@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from trajcli.job.read import job_from_text
+from trajcli.planning.binding_limits import tightest_limit, tightest_of_move, tightest_of_moves
 from trajcli.planning.plan import Plan, plan_job
-from trajcli.planning.tightest import tightest_limit, tightest_of_move, tightest_of_moves
 
 BARS = [{"name": "a", "a": 0.5}, {"name": "b", "a": 0.4}]
 

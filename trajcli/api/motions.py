@@ -378,7 +378,7 @@ def sweep(
     from trajcli.batches.sweep import PointLedger, axis_of, outcomes_of, parse_axis, sweep_of
     from trajcli.batches.sweep_table import SweepRow, SweepTable, form_of_table
     from trajcli.job.dump import mapping_text
-    from trajcli.job.yaml.source import read_bytes
+    from trajcli.job.yaml.document import read_bytes
 
     count = _processes(processes, timeout)
     if isinstance(job, Mapping) or (isinstance(job, str) and is_yaml(job)):

@@ -34,8 +34,8 @@ from trajcli.job.yaml.load import Document, parse_document
 from trajcli.output.delivery.delivered import delivered
 from trajcli.peers.move_reference import reference_of
 from trajcli.planners.planner import PlannedMove
+from trajcli.planning.binding_limits import tightest_limit
 from trajcli.planning.plan import Plan
-from trajcli.planning.tightest import tightest_limit
 from trajcli.streams.whole_file import whole_file
 
 MOST_ROWS = 1_000_000

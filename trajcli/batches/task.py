@@ -19,8 +19,8 @@ from trajcli.batches.ledger import LedgerEntry, hash_of_file, hash_of_inputs
 from trajcli.errors import FileError, InputError, Problem, TrajcliError, utf8
 from trajcli.frozen import comparable, frozen
 from trajcli.job.read import files_of, job_of_document
+from trajcli.job.yaml.document import read_bytes
 from trajcli.job.yaml.load import Document, parse_document
-from trajcli.job.yaml.source import read_bytes
 from trajcli.output.delivery.delivered import delivered
 from trajcli.output.write import grid_of, write_rows
 from trajcli.streams.formats import FormatName, format_of

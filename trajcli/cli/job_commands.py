@@ -32,7 +32,6 @@ class PlanCommand(CommandLine):
     """Plan a job, verify it, and write it: rows as CSV or JSON lines, a log, or a goal for a controller."""
 
     example = "trajcli plan examples/ur5e_pick.yaml -o rows.csv"
-    module = "gate"
 
     job: JobFile
     others: Annotated[list[str], argument("JOB", "More jobs, which are only judged: with --no-output.")] = []

@@ -1,4 +1,4 @@
-"""`trajcli plan`, and the summary that people read on standard error after it."""
+"""`trajcli plan`: jobs that are written or judged, the summary for people, annotations for CI."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.cli.outcome import print_remark, print_text
+from trajcli.cli.outcome import BUG, print_remark, print_text, report_bug, report_error
 from trajcli.cli.progress import is_terminal, progress
-from trajcli.errors import Amount, InputError, TrajcliError, VerificationError
+from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, VerificationError
 from trajcli.grids import Grid
 from trajcli.job.read import LoadedJob, files_of, load_job
 from trajcli.output.write import grid_of, write_rows, write_text
@@ -25,13 +25,86 @@ if TYPE_CHECKING:
     from trajcli.job.report import MoveReport
     from trajcli.job.report_parts import PathReferenceReport, PeerViolation, ReferenceReport
     from trajcli.judge.judgement import Judgement
+    from trajcli.output.annotations import AnnotationForm
     from trajcli.output.delivery.for_consumer import ForConsumer
     from trajcli.output.delivery.joined_rows import JoinedRows
     from trajcli.output.recording import LogOptions
     from trajcli.planning.flown_job import FlyBy
 
+_EXCLUDED = ("output", "report", "resolved")
 _FEW_STEPS = 9  # in acceleration: of more the largest says most
 _STILL = 1e-9  # rad/s or m/s, below which a joint only rounds
+
+
+def run_plan(options: PlanCommand) -> int:
+    """Plan and judge each job, whatever is wrong with the others; return the worst exit code.
+
+    Raises:
+        InputError: When several jobs would be written.
+    """
+    jobs, form = [options.job, *options.others], options.errors
+    if jobs.count("-") > 1:
+        raise InputError("standard input can be read once")
+    if len(jobs) > 1:
+        _check_nothing_is_written(options)
+    if form == "text" or form == "json":
+        return max(_exit_code_of_job(job, options) for job in jobs)
+    return _annotated(jobs, options, form)
+
+
+def _check_nothing_is_written(options: PlanCommand) -> None:
+    if not options.no_output:
+        hint = "only judge them with --no-output, or write them with `trajcli batch`"
+        raise InputError("several jobs cannot be written to one stream", hint=hint)
+    for name in (name for name in _EXCLUDED if getattr(options, name) is not None):
+        raise InputError(f"--{name} is about one job, and there are several", hint="name one job")
+
+
+def _exit_code_of_job(job: str, options: PlanCommand) -> int:
+    """Judge one of several jobs; report what is wrong with it, and return its exit code."""
+    try:
+        plan_and_write(job, options)
+    except TrajcliError as error:
+        report_error(error, options.errors)
+        return error.exit_code
+    except OSError:
+        raise
+    except Exception as error:  # noqa: BLE001
+        return report_bug(error, options.errors)
+    return 0
+
+
+def _annotated(jobs: Sequence[str], options: PlanCommand, form: AnnotationForm) -> int:
+    """Judge jobs; write one document, or a line for each annotation; return the worst exit code."""
+    from trajcli.output.annotations import annotations_of, render_annotations
+
+    code = 0
+    found: list[Problem] = []
+    quiet = options if form == "github" else options.replaced(quiet=True)  # a document stands alone
+    for job in jobs:
+        try:
+            found += _concessions(plan_and_write(job, quiet), job)
+        except TrajcliError as error:
+            found += annotations_of(error, job)
+            code = max(code, error.exit_code)
+        except OSError:
+            raise
+        except Exception as error:  # noqa: BLE001
+            from trajcli.version import library_error
+
+            of_library = library_error(error)
+            found += annotations_of(of_library or TrajcliError(Problem(f"a bug in trajcli: {error}")), job)
+            code = max(code, of_library.exit_code if of_library else BUG)
+    print(render_annotations(found, form, jobs), end="", file=sys.stderr)  # noqa: T201
+    return code
+
+
+def _concessions(plan: Plan, job: str) -> Iterator[Problem]:
+    """Yield what was conceded in a plan that verifies."""
+    for event in plan.events:
+        place = Place(job, 0, 0) if event.move is None else plan.loaded.place_of_move(event.move)
+        text = event.text(plan.loaded.say)
+        yield Problem(text, place=place, kind=event.kind, severity="warning")
 
 
 def plan_and_write(job: str, options: PlanCommand) -> Plan:
@@ -343,7 +416,7 @@ def summary(plan: Plan, rows: int, *, details: bool = False) -> str:
         rows: How many were written.
         details: Whether to say, too, how curves were computed.
     """
-    from trajcli.planning.tightest import tightest_limit
+    from trajcli.planning.binding_limits import tightest_limit
 
     count = plan.loaded.move_count
     head = f"{plan.loaded.name}: verified, {count} move{'s' * (count != 1)}, {plan.trajectory.duration:.6g} s"

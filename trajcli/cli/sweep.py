@@ -22,8 +22,8 @@ from trajcli.cli.outcome import print_lines, print_remark, print_text, report_er
 from trajcli.cli.progress import is_terminal
 from trajcli.errors import InputError, TrajcliError, utf8
 from trajcli.job.read import files_of
+from trajcli.job.yaml.document import read_bytes
 from trajcli.job.yaml.load import parse_document
-from trajcli.job.yaml.source import read_bytes
 from trajcli.streams.whole_file import refuse_overwriting, standard_output
 
 if TYPE_CHECKING:

@@ -103,7 +103,7 @@ def shown_table(
 
 def tightest_lines(plan: Plan, stream: TextIO | None) -> Iterator[str]:
     """Yield the table of the moves that use most of a limit: which one, and how much; then how many more."""
-    from trajcli.planning.tightest import tightest_of_moves
+    from trajcli.planning.binding_limits import tightest_of_moves
 
     of_moves = {one.span.index: one for one in tightest_of_moves(plan)}
     moves = [span for span in plan.trajectory.spans if not span.handles]

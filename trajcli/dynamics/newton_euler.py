@@ -36,8 +36,8 @@ from trajcli.kinematics.columns import (
     scaled,
     total,
 )
+from trajcli.kinematics.forward import blocks, configurations, links_of
 from trajcli.kinematics.robot import Payload, Robot
-from trajcli.kinematics.serial_chain import blocks, configurations, links_of
 
 REST = 1e-12  # rad/s or m/s
 _NO_SCREW: tuple[float, ...] = (0.0, 1.0, 0.0)

@@ -23,8 +23,8 @@ from pydantic_core import CoreSchema, core_schema
 from trajcli.errors import FileError, InputError, Place, Problem, utf8
 from trajcli.frozen import frozen
 from trajcli.job.model import UnitsSpec
+from trajcli.job.yaml.document import STDIN, read_bytes
 from trajcli.job.yaml.load import Document, parse_document
-from trajcli.job.yaml.source import STDIN, read_bytes
 from trajcli.kinematics.robot import QUANTITIES, Joint, Limits, Robot
 from trajcli.language.dynamics import FrictionSpec, LinkSpec
 from trajcli.language.limits import EffortBound, JointBound, VelocityByPosition

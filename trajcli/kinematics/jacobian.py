@@ -22,8 +22,7 @@ from trajcli.kinematics.columns import (
     minus,
 )
 from trajcli.kinematics.dh_rows import row_pose
-from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.serial_chain import (
+from trajcli.kinematics.forward import (
     JointAxis,
     MovingFrame,
     blocks,
@@ -31,6 +30,7 @@ from trajcli.kinematics.serial_chain import (
     links_of,
     travel,
 )
+from trajcli.kinematics.robot import Robot
 
 ReferenceFrame = Literal["world", "base", "tcp"]
 FEW = 96  # configurations up to which products of matrices are faster

@@ -22,9 +22,8 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.power_series import series_exponential, series_product
 from trajcli.kinematics.columns import ZERO, Entry, VectorEntries, advance, cross, minus, plus
-from trajcli.kinematics.forward import link_poses
+from trajcli.kinematics.forward import blocks, configurations, link_poses, links_of, travel
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.serial_chain import blocks, configurations, links_of, travel
 
 Derivatives = list[VectorEntries]
 

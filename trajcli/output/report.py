@@ -40,10 +40,9 @@ from trajcli.job.report_parts import AtLimitReport, FlyByReport, SignalReport
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.knots import Knots, has_knots, knots_of
 from trajcli.planners.planner import Event, PlannedMove
+from trajcli.planning.binding_limits import tightest_of_move, times_at_limits
 from trajcli.planning.plan import Plan
 from trajcli.planning.planned_move import path_of_tool
-from trajcli.planning.sensitivity import times_at_limits
-from trajcli.planning.tightest import tightest_of_move
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import joint_units
 from trajcli.version import __version__

@@ -24,8 +24,8 @@ from trajcli.units import effort_unit, joint_units
 
 if TYPE_CHECKING:
     from trajcli.limits.effort import MoveEfforts
+    from trajcli.planning.binding_limits import Saving
     from trajcli.planning.flown_job import FlownZone, FlyBy
-    from trajcli.planning.sensitivity import Saving
 
 _NOTHING = 1e-9  # relative to the duration: what rounding leaves of no saving
 
@@ -157,7 +157,7 @@ def with_savings(report: Report, plan: Plan, moves: Sequence[int]) -> Report:
         plan: The plan.
         moves: Indices of the moves that are looked at.
     """
-    from trajcli.planning.sensitivity import savings_of
+    from trajcli.planning.binding_limits import savings_of
 
     savings = list(savings_of(plan, moves))
     of_moves = tuple(_with_own(move, plan, savings) if move.index in moves else move for move in report.moves)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.job.read import LoadedJob
 from trajcli.job.robot import is_urdf
-from trajcli.job.yaml.source import read_bytes
+from trajcli.job.yaml.document import read_bytes
 from trajcli.player.rows import packed
 from trajcli.urdf.read import MAX_BYTES
 from trajcli.urdf.visuals import RowSurface, Visuals, visuals_of

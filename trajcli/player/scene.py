@@ -17,8 +17,8 @@ from trajcli.findings import Finding
 from trajcli.grids import AT_BREAK
 from trajcli.kinematics.robot import QUANTITIES, JointType, Limits, Robot
 from trajcli.planners.planner import Event
+from trajcli.planning.binding_limits import tightest_of_moves
 from trajcli.planning.plan import Plan
-from trajcli.planning.tightest import tightest_of_moves
 from trajcli.player.rows import ORDERS, DrawnRows, packed, rows_of_curve
 from trajcli.trajectory import Span, Trajectory
 from trajcli.units import Quantity, Units, effort_unit, factor, joint_quantity, typeset, unit_name

@@ -15,9 +15,9 @@ from trajcli.errors import Amount, InputError
 from trajcli.frozen import comparable, frozen
 from trajcli.job.robot import RobotSheet, is_urdf, load_sheet
 from trajcli.job.yaml.load import read_document
+from trajcli.kinematics.forward import links_of
 from trajcli.kinematics.inverse.joint_turns import beyond
 from trajcli.kinematics.robot import MountedTool, Robot
-from trajcli.kinematics.serial_chain import links_of
 from trajcli.streams.whole_file import kind_of
 from trajcli.units import (
     Quantity,

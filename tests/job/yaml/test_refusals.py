@@ -6,8 +6,8 @@ import pytest
 
 from trajcli.errors import InputError, Problem
 from trajcli.job.yaml import load
+from trajcli.job.yaml.document import MAX_BYTES
 from trajcli.job.yaml.load import MAX_DEPTH, parse_document
-from trajcli.job.yaml.source import MAX_BYTES
 
 START = "version: 1\n"
 

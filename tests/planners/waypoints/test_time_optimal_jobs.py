@@ -16,8 +16,8 @@ from trajcli.errors import PlanningError
 from trajcli.output.explain import explanation
 from trajcli.output.report import report_of
 from trajcli.planners.planner import stretched
+from trajcli.planning.binding_limits import times_at_limits
 from trajcli.planning.retime import with_duration
-from trajcli.planning.sensitivity import times_at_limits
 
 V, A = 2.0, 8.0
 LIMITS = {"velocity": V, "acceleration": A}

@@ -25,11 +25,13 @@ from yaml.events import (
 from yaml.scanner import ScannerError
 
 from trajcli.errors import InputError, Problem
-from trajcli.job.yaml.document import Document, Node, place
-from trajcli.job.yaml.source import (
+from trajcli.job.yaml.document import (
     STDIN,
+    Document,
+    Node,
     check_characters,
     decode,
+    place,
     read_bytes,
     split_lines,
     tab_problem,

@@ -23,8 +23,8 @@ from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.calibration.parameters import POSE, ArmParameter, units_of
 from trajcli.kinematics.columns import ZERO, VectorEntries, cross, minus
+from trajcli.kinematics.forward import Link, MovingFrame, configurations, links_of
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.serial_chain import Link, MovingFrame, configurations, links_of
 
 RANK_TOLERANCE = 1e-8
 """Of the largest singular value; below it a combination of parameters counts as unidentifiable."""

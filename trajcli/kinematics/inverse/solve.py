@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.geometry.rotation import AXES, Flags
-from trajcli.kinematics.forward import forward
+from trajcli.kinematics.forward import configurations, forward
 from trajcli.kinematics.inverse.answers import Answers, by_name, closures, polish, rough
 from trajcli.kinematics.inverse.families.batch import candidates
 from trajcli.kinematics.inverse.families.choose import method_for
@@ -20,7 +20,6 @@ from trajcli.kinematics.inverse.joint_turns import choose_turns
 from trajcli.kinematics.inverse.solutions import Solutions
 from trajcli.kinematics.inverse.target import IkTarget, partial_target, pose_target
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.serial_chain import configurations
 
 if TYPE_CHECKING:
     from trajcli.kinematics.inverse.partial_targets import Postures

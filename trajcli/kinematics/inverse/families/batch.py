@@ -35,6 +35,7 @@ from trajcli.kinematics.columns import (
     total,
     uncombine,
 )
+from trajcli.kinematics.forward import Link, links_of
 from trajcli.kinematics.inverse.families.method import Choice, IkMethod
 from trajcli.kinematics.inverse.families.screw_axes import AxisGeometry, Displacement, Floats
 from trajcli.kinematics.inverse.families.subproblems import (
@@ -48,7 +49,6 @@ from trajcli.kinematics.inverse.families.subproblems import (
     turned_back,
 )
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.serial_chain import Link, links_of
 
 _X: Floats = (1.0, 0.0, 0.0)
 _Y: Floats = (0.0, 1.0, 0.0)

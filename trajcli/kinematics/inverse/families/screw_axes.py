@@ -29,8 +29,8 @@ from trajcli.kinematics.columns import (
     scaled,
 )
 from trajcli.kinematics.dexterity import characteristic_length
+from trajcli.kinematics.forward import Link, MovingFrame, links_of, travel
 from trajcli.kinematics.robot import Robot
-from trajcli.kinematics.serial_chain import Link, MovingFrame, links_of, travel
 
 PARALLEL = 1e-9  # sine of the angle: an alpha typed with ten digits is meant to be a right angle
 MEETING = 1e-9  # of the arm's length: a picometre, where drawings say a tenth of a millimetre
