@@ -253,10 +253,14 @@ def _verified(
     tries = coarser = 0
     while True:
         found = _assembled(motion, ranges, [stretch.factor for stretch in stretches], coarser)
+        read = as_read(found).rows
         try:
-            broken = None if found is motion else judge(as_read(found).rows)
-        except VerificationError:
+            broken = None if found is motion and _as_certain(read, motion.rows) else judge(read)
+        except VerificationError as error:
             # numbers that are rounded twice are off by more than their decimals say: fewer are certain
+            if not read.resolution.q.any() and as_read is not EditedMotion.as_written:
+                _verified_as_csv(motion, ranges, stretches, judge, error)
+                raise
             if coarser == _FEWER:
                 raise
             coarser += 1
@@ -268,6 +272,32 @@ def _verified(
             message = f"rounded as it would be written, {broken.text()}"
             raise VerificationError(Problem(message, joint=broken.joint, kind=broken.kind))
         stretches = [_longer(stretch, broken) for stretch in stretches]
+
+
+def _as_certain(read: RecordedMotion, rows: RecordedMotion) -> bool:
+    """Return whether numbers that are read again are rounded as those of the file were."""
+    one, other = (
+        [(each.time, each.relative_time), *each.roundings] for each in (read.resolution, rows.resolution)
+    )
+    return all(
+        np.array_equal(a, b) for pair in zip(one, other, strict=True) for a, b in zip(*pair, strict=True)
+    )
+
+
+def _verified_as_csv(
+    motion: EditedMotion,
+    ranges: list[slice],
+    stretches: list[Stretch],
+    judge: Judge,
+    error: VerificationError,
+) -> None:
+    """Refuse all digits of a motion with the advice to write its decimals, where these leave room."""
+    try:
+        _verified(motion, ranges, stretches, judge, EditedMotion.as_written)
+    except VerificationError:
+        return
+    hint = "the decimals of a CSV leave room for that, all digits do not: `-o FILE.csv`"
+    raise VerificationError(*(replace(problem, hint=hint) for problem in error.problems)) from None
 
 
 def _longer(stretch: Stretch, broken: Finding) -> Stretch:

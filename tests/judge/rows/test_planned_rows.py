@@ -9,6 +9,8 @@ import pytest
 import random_jobs
 from planned_examples import planned_once
 
+from trajcli.editing.edited_motion import ReadingOptions, read_motion
+from trajcli.editing.writing import write_motion
 from trajcli.job.read import load_job
 from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
@@ -92,3 +94,17 @@ def test_a_plan_of_no_duration_is_read_again(ending: str, tmp_path: Path) -> Non
     write_plan(plan, str(file))
     found = judged(plan, file)
     assert (found.rows, found.planned_rows, found.verdict) == (1, True, "satisfied")
+
+
+@pytest.mark.parametrize("ending", ["jsonl", "mcap", "npz", "yaml"])
+@pytest.mark.parametrize("over", [0.0, 2e-9])
+def test_rows_of_nine_decimals_are_known_where_all_digits_are_written(
+    ending: str, over: float, tmp_path: Path
+) -> None:
+    plan, file = planned(EXAMPLES / "gantry.yaml", "output.columns=[t, q, qd, qdd]"), tmp_path / "rows.csv"
+    write_plan(plan, str(file))
+    motion = read_motion(str(file), ReadingOptions(), joints=plan.loaded.robot.joint_names)
+    assert motion.rows.qdd is not None
+    motion.rows.qdd[7, 1] += over
+    write_motion(motion, str(tmp_path / f"rows.{ending}"))
+    assert judged(plan, tmp_path / f"rows.{ending}").planned_rows is (over == 0.0)

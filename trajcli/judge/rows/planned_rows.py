@@ -1,9 +1,9 @@
 """Rows of a planned motion: whether those of a file are samples of it, on a whole grid of times.
 
-They are when each number is that of the planned curve to half a unit of its last decimal, and the stamps are
-all times of one rate from the start to the end, the times that the job lists, its knots, or its knots and all
-times of the job's rate. The start time may be another. A row that is missing, doubled or out of order makes
-them a motion of its own.
+They are when each number is that of the planned curve to half a unit of its last decimal (the ninth where all
+digits are given: they may come from a CSV), and the stamps are all times of one rate from the start to the
+end, the times that the job lists, its knots, or its knots and all times of the job's rate. The start time
+may be another. A row that is missing, doubled or out of order makes them a motion of its own.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from trajcli.units import Units
 _ROWS = 4096  # compared at a time
 _KEPT = 1 << 22  # numbers that are kept in memory; of a longer file rows are read anew
 _HALF = 0.5 * (1 + 1e-6)  # of a unit: what rounding may have moved a number by
+_OF_CSV = _HALF * 1e-9  # SI: of exact numbers that were converted from what `plan` writes
 _BITS = 1e-11  # relative, and SI: what other processors, and units, leave of the last bits
 _ULPS = 8.0  # of a stamp
 _NO_GRID = (
@@ -140,18 +141,19 @@ def compare_with_plan(
     mapped = {column.name: column.factor for column in read}
     named = zip(rows.named.names, columns, strict=True)
     factors = np.array([mapped.get(name, column.factor) for name, column in named])
+    halves = np.where(halves > 0, halves * factors, _OF_CSV)
     of_file = _Rows(rows, columns, factors, groups, index, kept)
     difference = None
     for grid in _grids(plan, stamps, groups):
         if grid.count != stamps.count or not _stands_on(of_file, grid, stamps):
             continue
-        first = _first_difference(of_file, plan, grid, halves * factors, stamps)
+        first = _first_difference(of_file, plan, grid, halves, stamps)
         if first is None:
             return RowComparison(planned=True)
         difference = difference or first
-    backward = _backward(of_file, plan, halves * factors, stamps)
+    backward = _backward(of_file, plan, halves, stamps)
     return RowComparison(
-        planned=False, difference=backward or difference or _beside(of_file, plan, halves * factors, stamps)
+        planned=False, difference=backward or difference or _beside(of_file, plan, halves, stamps)
     )
 
 
