@@ -43,8 +43,8 @@ def coarse(tmp_path: Path) -> Path:
     return path
 
 
-def arm(folder: Path, velocity: float) -> str:
-    (folder / "arm.yaml").write_text(f"joints: [{{velocity: {velocity}, acceleration: 5}}]\n")
+def arm(folder: Path, velocity: float, more: str = ", acceleration: 5") -> str:
+    (folder / "arm.yaml").write_text(f"joints: [{{velocity: {velocity}{more}}}]\n")
     return str(folder / "arm.yaml")
 
 
@@ -92,3 +92,30 @@ def test_where_no_time_helps_a_csv_does(ending: str, velocity: float, coarse: Pa
     _, stretch = retimed(coarse, robot, advised)
     assert stretch.factor == pytest.approx(max(1 / velocity, 1), rel=0.02)
     assert check_file(str(advised), CheckOptions(robot=robot)).judgement.passed
+
+
+def test_what_a_csv_does_not_keep_either_is_not_advised(tmp_path: Path) -> None:
+    """Of velocities made ten times as large no decimal is certain."""
+    t = np.arange(501) / 500
+    q, qd = t**3 * (10 - 15 * t + 6 * t**2), 30 * t**2 * (1 - t) ** 2
+    source = tmp_path / "rows.csv"
+    lines = (f"{a:.3f},{b:.9f},{c:.2f}\n" for a, b, c in zip(t, q, qd, strict=True))
+    source.write_text("t,q1,qd1\n" + "".join(lines))
+    motion, kept = read_motion(str(source), ReadingOptions()), kept_limits(None, arm(tmp_path, 20.0, ""))
+    for ending in ("mcap", "csv"):
+        reader = partial(as_read, path=f"out.{ending}")
+        with pytest.raises(VerificationError) as caught:
+            retime(motion, kept.requirements, fastest=True, as_read=reader)
+        assert caught.value.problems[0].hint == "another time of the motion does not help"
+
+
+@pytest.mark.parametrize("ending", ["mcap", "csv"])
+def test_numbers_of_single_precision_excuse_nothing_in_those_of_double(ending: str, tmp_path: Path) -> None:
+    """The float32 next to 0.1 is above it by 1.5e-8 of it."""
+    t, source, output = np.arange(101) / 100, tmp_path / "rows.npz", tmp_path / f"out.{ending}"
+    q, qd = 0.1 * t[:, None], np.full((101, 1), 0.1)
+    np.savez(source, t=t.astype(np.float32), q=q.astype(np.float32), qd=qd.astype(np.float32))
+    robot = arm(tmp_path, 0.1, "")
+    assert check_file(str(source), CheckOptions(robot=robot)).judgement.passed
+    retimed(source, robot, output)
+    assert check_file(str(output), CheckOptions(robot=robot)).judgement.passed

@@ -48,9 +48,12 @@ def robot(path: Path, limits: str) -> Path:
 
 
 def retimed(source: Path, arm: Path, *, fastest: bool = False) -> tuple[EditedMotion, Stretch]:
-    limits = kept_limits(None, str(arm))
+    requirements, motion = (
+        kept_limits(None, str(arm)).requirements,
+        read_motion(str(source), ReadingOptions()),
+    )
     found, (stretch,) = retime(
-        read_motion(str(source), ReadingOptions()), limits.requirements, fastest=fastest
+        motion, requirements, fastest=fastest, as_read=partial(as_read, path="out.csv")
     )
     return found, stretch
 

@@ -276,12 +276,8 @@ def _verified(
 
 def _as_certain(read: RecordedMotion, rows: RecordedMotion) -> bool:
     """Return whether numbers that are read again are rounded as those of the file were."""
-    one, other = (
-        [(each.time, each.relative_time), *each.roundings] for each in (read.resolution, rows.resolution)
-    )
-    return all(
-        np.array_equal(a, b) for pair in zip(one, other, strict=True) for a, b in zip(*pair, strict=True)
-    )
+    both = zip(read.resolution.roundings, rows.resolution.roundings, strict=True)
+    return all(np.array_equal(a, b) and share == other for (a, share), (b, other) in both)
 
 
 def _verified_as_csv(
