@@ -7,6 +7,7 @@ import pickle
 import unicodedata
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob, job_from_text
@@ -18,6 +19,7 @@ from trajcli.language.numbers import (
     flaw_of_name,
     number_schema,
     read_number,
+    shown,
 )
 from trajcli.language.per_joint import NamedValues
 from trajcli.units import Quantity, Units
@@ -114,6 +116,61 @@ def test_names_are_texts_of_one_line_that_show() -> None:
         assert "no control characters" in (flaw_of_name(f"a{letter}b") or ""), unicodedata.category(letter)
     for letter in (" ", "\u00a0", "\U0001f600", "\u0301"):
         assert flaw_of_name(f"a{letter}b") is None
+
+
+def test_a_letter_that_no_name_holds_is_said_by_its_number() -> None:
+    assert "got U+200E in" in (flaw_of_name("a\u200eb\n") or "")
+    assert "got U+000A in" in (flaw_of_name("ab\n") or "")
+
+
+SHOWN = [  # a value, how messages quote it
+    ("up", '"up"'),
+    ("x" * 300, f'"{"x" * 100}..."'),
+    (True, "true"),
+    (False, "false"),
+    (None, "null"),
+    (0.1234567890123, "0.1234567890123"),
+    (0.1 + 0.2, "0.3"),
+    (12345678901234567890, "12345678901234567890"),
+    ({"a": 1}, "a mapping"),
+    ([1], "a list"),
+    ((1,), "a list"),
+]
+
+
+@pytest.mark.parametrize(("value", "text"), SHOWN)
+def test_messages_quote_values_as_they_stand_in_a_file(value: object, text: str) -> None:
+    assert shown(value) == text
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan, "x", None])
+def test_what_is_no_number_is_refused_with_the_unit_of_one(value: object) -> None:
+    expected = "expected a finite number (deg), got" if isinstance(value, float) else "expected a"
+    with pytest.raises(FlawError) as caught:
+        read_number(value, Quantity("angle"), MM)
+    assert str(caught.value).startswith(expected)
+    with pytest.raises(FlawError, match=r"expected a( finite)? number, got"):
+        read_number(value if isinstance(value, float) else True, Quantity("ratio"), MM)
+
+
+@pytest.mark.parametrize("value", [1e20, "1e20 deg", 1e-20])
+def test_what_no_robot_has_is_told_to_be_looked_at_again(value: float | str) -> None:
+    with pytest.raises(FlawError) as caught:
+        Number(Quantity("angle", 1) if value == 1e-20 else Quantity("angle"), "", above=0.0).read(
+            value, ReadingContext(MM)
+        )
+    assert caught.value.flaws[0][2] == "no robot has such a number: check its exponent and its unit"
+
+
+def test_schemas_of_numbers_round_bounds_up_to_three_digits_and_keep_stated_ones() -> None:
+    assert number_schema(Quantity("length"))["anyOf"][0]["maximum"] == pytest.approx(1e15, rel=1e-12)
+    assert number_schema(Quantity("angle"))["anyOf"][0]["maximum"] == pytest.approx(5.73e13, rel=1e-12)
+    share = number_schema(Quantity("ratio"), exclusiveMinimum=0.0, maximum=1.0)
+    told = [Draft202012Validator(share).is_valid(each) for each in (0.5, 1, 0, 1.5, "1")]
+    assert told == [True, True, False, False, False]
+    length = Draft202012Validator(Number(Quantity("length"), "", at_least=-1.0, at_most=2.0).json_schema())
+    told = [length.is_valid(each) for each in (-1, 2, "-3 mm", "+3 mm", ".5 mm", -1.5, 2.5, "far", True)]
+    assert told == [True] * 5 + [False] * 4
 
 
 def job(line: str) -> LoadedJob:
