@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import pickle
 import unicodedata
+from typing import Annotated
 
 import pytest
 from jsonschema import Draft202012Validator
+from pydantic import TypeAdapter
 
 from trajcli.errors import InputError
 from trajcli.job.read import LoadedJob, job_from_text
@@ -15,6 +17,7 @@ from trajcli.language.numbers import (
     LONGEST_NAME,
     FlawError,
     Number,
+    PointName,
     ReadingContext,
     flaw_of_name,
     number_schema,
@@ -165,12 +168,22 @@ def test_what_no_robot_has_is_told_to_be_looked_at_again(value: float | str) -> 
 def test_schemas_of_numbers_round_bounds_up_to_three_digits_and_keep_stated_ones() -> None:
     assert number_schema(Quantity("length"))["anyOf"][0]["maximum"] == pytest.approx(1e15, rel=1e-12)
     assert number_schema(Quantity("angle"))["anyOf"][0]["maximum"] == pytest.approx(5.73e13, rel=1e-12)
-    share = number_schema(Quantity("ratio"), exclusiveMinimum=0.0, maximum=1.0)
+    share = Number(Quantity("ratio"), "", above=0.0, at_most=1.0).json_schema()
     told = [Draft202012Validator(share).is_valid(each) for each in (0.5, 1, 0, 1.5, "1")]
     assert told == [True, True, False, False, False]
     length = Draft202012Validator(Number(Quantity("length"), "", at_least=-1.0, at_most=2.0).json_schema())
     told = [length.is_valid(each) for each in (-1, 2, "-3 mm", "+3 mm", ".5 mm", -1.5, 2.5, "far", True)]
     assert told == [True] * 5 + [False] * 4
+
+
+def test_the_schema_of_a_field_says_what_it_is_and_which_names_there_are() -> None:
+    field = TypeAdapter(Annotated[float, Number(Quantity("time"), "How long.")])
+    assert field.json_schema()["description"] == "How long."
+    name = Draft202012Validator(PointName("").json_schema())
+    for taken in ("p1", "1a", "e5", "heres", "a" * LONGEST_NAME):
+        assert name.is_valid(taken), taken
+    for refused in ("", "here", "tool", "stop", "1", "-2.5e-3", "a" * (LONGEST_NAME + 1), 3, None):
+        assert not name.is_valid(refused), refused
 
 
 def job(line: str) -> LoadedJob:
