@@ -205,7 +205,16 @@ def test_other_words_are(name: str) -> None:
     assert list(job(f'points: {{"{name}": {{joints: 0}}}}').job.points) == [name]
 
 
-EMPTY = ["name:", "limits:", "tool:", "base:", "zone:", "output: {times: }", "limits: {tcp: {speed: }}"]
+EMPTY = [
+    "name:",
+    "limits:",
+    "tool:",
+    "base:",
+    "zone:",
+    "output: {times: }",
+    "limits: {tcp: {speed: }}",
+    "points: {a: {joints: 0, in: }}",
+]
 
 
 @pytest.mark.parametrize("line", EMPTY)

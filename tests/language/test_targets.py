@@ -93,3 +93,10 @@ def test_joints_beside_a_pose_that_is_asked_for_are_named() -> None:
     assert AskedPose(xyz=(0.0, 0.0, 0.0)).pins == {}
     with pytest.raises(ValueError, match="beside a pose `joints` pins some joints by name"):
         AskedPose(xyz=(0.0, 0.0, 0.0), joints=(0.0, 1.0))
+
+
+def test_a_target_is_never_changed() -> None:
+    target = Target(joints=(0.0,))
+    with pytest.raises(ValueError, match="frozen"):
+        target.joints = (1.0,)  # type: ignore[misc]
+    assert hash(target) == hash(Target(joints=(0.0,)))
