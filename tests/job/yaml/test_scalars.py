@@ -25,6 +25,7 @@ VALUES = [
     ("FALSE", False),
     ("tRue", "tRue"),
     *[(word, word) for word in ("yes", "no", "on", "off", "y", "n", "Yes", "NO", "On", "OFF")],
+    *[(word, word) for word in ("none", "None", "nil", "undefined", "nothing", "-", "~~", "true ", "N/A")],
     ("0", 0),
     ("-0", 0),
     ("+12", 12),

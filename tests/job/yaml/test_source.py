@@ -34,6 +34,10 @@ def test_files(tmp_path: Path) -> None:
     read = read_document(str(path))
     assert read.file == str(path)
     assert read.plain() == {"a": 1}
+    path.write_text("- 1\n- {b: 2}\n")
+    assert read_document(str(path), any_root=True).plain() == [1, {"b": 2}]
+    with pytest.raises(InputError, match="expected a mapping"):
+        read_document(str(path))
 
 
 @pytest.mark.parametrize(
