@@ -6,7 +6,7 @@ import pytest
 
 from trajcli.errors import InputError, Problem
 from trajcli.job.yaml import load
-from trajcli.job.yaml.document import MAX_BYTES
+from trajcli.job.yaml.document import MAX_BYTES, place
 from trajcli.job.yaml.load import MAX_DEPTH, parse_document
 
 START = "version: 1\n"
@@ -41,6 +41,9 @@ REFUSALS = [  # text, line, column, what is underlined, message, hint
     ("1: a\n", 1, 1, "1", "the key 1 is no name", 'write "1", of a point p1'),
     ("-2.5: a\n", 1, 1, "-2.5", "the key -2.5 is no name", 'write "-2.5", of a point p-2.5'),
     ("{a: 0,2}\n", 1, 7, "2", "the key 2 is no name", "write 0.2: decimals have a point"),
+    ("{a: 0,-2}\n", 1, 7, "-2", "the key -2 is no name", 'write "-2", of a point p-2'),
+    ("{a: 1,2.5}\n", 1, 7, "2.5", "the key 2.5 is no name", 'write "2.5", of a point p2.5'),
+    ("!x a: 1\n", 1, 1, "!x", "tags are not read, got !x", "leave it out"),
     ("true: a\n", 1, 1, "true", "the key true is no name", 'write "true"'),
     ("~: a\n", 1, 1, "~", "the key ~ is no name", 'write "~"'),
     ("? [a]\n: 1\n", 1, 3, "[a]", "a list cannot be a key", None),
@@ -244,3 +247,41 @@ def test_words_of_yaml_1_1_and_quoted_signs_are_plain_text() -> None:
 
 def test_a_yaml_1_2_header_is_read() -> None:
     assert parse_document("%YAML 1.2\n---\na: 010\n...\n", "f").plain() == {"a": 10}
+
+
+def test_a_whole_that_is_no_mapping_is_said_shortly_and_by_its_file() -> None:
+    (problem,) = refused("x" * 60)
+    assert problem.message.endswith(f"got the single value {'x' * 40}")
+    (problem,) = refused("")
+    assert problem.message == "the file is empty"
+    hints = {}
+    for file in ("a.csv", "a.txt", "a.yaml"):
+        with pytest.raises(InputError) as caught:
+            parse_document("t,q1\n0,1\n", file)
+        hints[file] = caught.value.problems[0].hint
+    rows = "rows are judged by `trajcli check`, and drawn by `trajcli plot`"
+    assert hints == {"a.csv": rows, "a.txt": rows, "a.yaml": None}
+
+
+def test_a_number_that_is_too_long_to_show_says_how_long_it_is() -> None:
+    (problem,) = refused(f"a: {'9' * 400}\n")
+    assert problem.message.startswith(f"{'9' * 40}... (400 characters) is too large")
+
+
+def test_a_colon_in_a_key_is_part_of_it_where_a_space_follows_the_last() -> None:
+    assert parse_document("a:b:\nc:d: 1\n", "f").plain() == {"a:b": None, "c:d": 1}
+
+
+def test_places_are_in_the_text_and_mean_one_character_at_least() -> None:
+    read = parse_document('"0": [1,  \n 2]\n', "f")
+    assert read.node((0,)) is None
+    assert read.root.child("0") is not None
+    here = read.place(("0",))
+    assert here.source[here.column - 1 : here.column - 1 + here.length] == "[1,"
+    assert (read.round_of(3), read.without_round("a#2")) == ("", "a#2")
+    lines = ["a: 1", "bb", "", ""]
+    for line in (4, 5, 9):
+        behind = place("f", lines, line, 7, 5)
+        assert (behind.line, behind.column, behind.length, behind.source) == (2, 3, 1, "bb")
+    assert (place("f", lines, 3, 1, 0).line, place("f", lines, 1, 1, 0).length) == (3, 1)
+    assert place("f", ["", ""], 2, 3).line == 1
