@@ -73,7 +73,8 @@ def test_calls_count_from_the_time_of_the_start_and_end_within_rounding(start: f
     assert f"it lasts from {start:g} s to {start + 3:g} s" in str(caught.value.problems[0].hint)
     with pytest.raises(InputError):
         trajectory("soon")  # type: ignore[arg-type]
-    for order in (True, -1, 1.0):
+    assert trajectory(start + 2.0, np.int64(1)) == trajectory(start + 2.0, 1) == pytest.approx(4.0)
+    for order in (True, -1, 1.0, np.int64(-1), np.True_, "1"):
         with pytest.raises(InputError, match="the order of the derivative"):
             trajectory(start, order)  # type: ignore[arg-type]
     rows = trajectory.sample(1.0)

@@ -315,7 +315,7 @@ class Trajectory:
             InputError: When a time is no number or outside the trajectory, or the order is none.
         """
         times = np.asarray(numeric(t, "t"), dtype=np.float64)
-        if isinstance(order, bool) or not isinstance(order, int) or order < 0:
+        if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 0:
             raise InputError(f"the order of the derivative is {order!r}, expected 0, 1, 2 or more")
         local = np.atleast_1d(times).reshape(-1) - self.start_time
         outside = ~((local >= -_ROUNDING) & (local <= self.duration + _ROUNDING))
