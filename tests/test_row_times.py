@@ -75,6 +75,13 @@ def test_an_end_that_float64_cannot_tell_from_a_grid_time_takes_its_place():
         assert np.unique(times).size == times.size == rows
 
 
+@pytest.mark.parametrize("rate", [1.0, 1e-3, 1e-7, 1e-12])
+def test_a_motion_has_its_start_and_its_end_however_low_the_rate_is(rate: float) -> None:
+    (times,) = [block[1] for block in UniformGrid(0.8, rate, 5.0).blocks()]
+    assert times.tolist() == [0.0, 0.8]
+    assert (UniformGrid(0.0, rate).count, UniformGrid(1e-10, rate).count) == (1, 1)
+
+
 def stepping(duration: float, when: float) -> Trajectory:
     """Return a joint that rests, and from `when` on goes at 1 rad/s."""
     curve = PiecewisePolynomial([0.0, when, duration], np.array([[0.0, 1.0], [0.0, 0.0]])[:, :, None])

@@ -52,8 +52,9 @@ class UniformGrid:
     @property
     def count(self) -> int:
         """Number of rows, at least 1."""
-        near = max(_END / self.rate, NANOSECOND, 2 * self._spacing)
-        return max(ceil((self.duration - near) * self.rate), 0) + 1
+        least = max(NANOSECOND, 2 * self._spacing)
+        near = max(_END / self.rate, least)
+        return max(ceil((self.duration - near) * self.rate), int(self.duration > least)) + 1
 
     @property
     def _spacing(self) -> float:
