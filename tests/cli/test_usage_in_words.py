@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 
 import pytest
+import typer.core
 from running import EXAMPLES, call
 
+from trajcli.cli.app import Commands
 from trajcli.cli.command import CommandLine
 from trajcli.cli.job_commands import PayloadCommand
 
@@ -68,6 +70,29 @@ def test_errors_of_usage_have_the_form_that_is_asked_for(
         assert (told["exit"], told["problems"][0]["hint"]) == (2, "see --help")
     if form == "sarif":
         assert json.loads(out + err)["version"] == "2.1.0"
+
+
+def test_errors_of_commands_have_the_form_that_is_asked_for(capfd: Capture) -> None:
+    code, out, err = call(capfd, "fk", "--robot", "nobody", "0", "--errors", "json")
+    told = json.loads(err)
+    assert (code, out, told["exit"], "nobody" in told["problems"][0]["message"]) == (2, "", 2, True)
+
+
+@pytest.mark.parametrize("ends", [3, None, RuntimeError("a bug")])
+def test_a_form_for_programs_hides_no_other_end(
+    monkeypatch: pytest.MonkeyPatch, ends: int | RuntimeError | None
+) -> None:
+    def main(*_words: object, **options: object) -> int | None:
+        assert options["standalone_mode"] is False
+        if isinstance(ends, RuntimeError):
+            raise ends
+        return ends
+
+    monkeypatch.setattr(typer.core.TyperGroup, "main", main)
+    group = Commands(name="trajcli", commands={})
+    with pytest.raises(RuntimeError if isinstance(ends, RuntimeError) else SystemExit) as caught:
+        group.main(["plan", "--errors", "json"])
+    assert isinstance(ends, RuntimeError) or getattr(caught.value, "code", None) == (ends or 0)
 
 
 def test_behind_two_dashes_words_are_no_options(capfd: Capture) -> None:
