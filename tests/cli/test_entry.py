@@ -91,7 +91,7 @@ ENDS = [  # what ends the command line, its exit code, what stands on standard e
 ]
 
 
-@pytest.mark.parametrize(("error", "code", "said"), ENDS)
+@pytest.mark.parametrize(("error", "code", "said"), ENDS, ids=range(len(ENDS)))
 def test_each_end_of_the_command_line_has_its_exit_code(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],

@@ -44,7 +44,7 @@ WRONG = [  # head, move, message, what stands at its place, hint
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("head", "move", "message", "at", "hint"), WRONG)
+@pytest.mark.parametrize(("head", "move", "message", "at", "hint"), WRONG, ids=range(len(WRONG)))
 def test_what_no_target_says_is_refused_where_it_stands(
     head: str, move: str, message: str, at: str, hint: str | None
 ) -> None:
