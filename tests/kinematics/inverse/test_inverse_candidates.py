@@ -13,9 +13,9 @@ from inverse_arms import FAMILIES, arm, gap, random_joints, turning
 from scipy.spatial.transform import Rotation
 
 from trajcli.kinematics.forward import forward
-from trajcli.kinematics.inverse.families import batch as closed_form
-from trajcli.kinematics.inverse.families.batch import candidates
+from trajcli.kinematics.inverse.families import method as closed_form
 from trajcli.kinematics.inverse.families.choose import method_for
+from trajcli.kinematics.inverse.families.method import candidates
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.joint_turns import choose_turns
 from trajcli.kinematics.inverse.solve import solve

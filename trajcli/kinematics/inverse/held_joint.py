@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from trajcli.curves.piecewise import Array
 from trajcli.geometry.rotation import Flags
 from trajcli.kinematics.dexterity import characteristic_length
-from trajcli.kinematics.inverse.families.batch import candidates
 from trajcli.kinematics.inverse.families.choose import method_for, poses_for_the_others
-from trajcli.kinematics.inverse.families.method import IkMethod
+from trajcli.kinematics.inverse.families.method import IkMethod, candidates
 from trajcli.kinematics.inverse.families.screw_axes import axis_geometry
 from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns
 from trajcli.kinematics.inverse.target import IkTarget

@@ -29,8 +29,7 @@ from trajcli.frozen import frozen
 from trajcli.geometry.rotation import AxisName, Flags
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.answers import Answers, closures, joined, polish, rough
-from trajcli.kinematics.inverse.families.batch import candidates
-from trajcli.kinematics.inverse.families.method import IkMethod
+from trajcli.kinematics.inverse.families.method import IkMethod, candidates
 from trajcli.kinematics.inverse.families.screw_axes import AxisGeometry
 from trajcli.kinematics.inverse.families.subproblems import DegeneracyFlags, Turn
 from trajcli.kinematics.inverse.joint_turns import FULL, beyond, choose_turns, revolute

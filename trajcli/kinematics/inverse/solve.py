@@ -12,9 +12,8 @@ from trajcli.errors import InputError
 from trajcli.geometry.rotation import AXES, Flags
 from trajcli.kinematics.forward import configurations, forward
 from trajcli.kinematics.inverse.answers import Answers, by_name, closures, polish, rough
-from trajcli.kinematics.inverse.families.batch import candidates
 from trajcli.kinematics.inverse.families.choose import method_for
-from trajcli.kinematics.inverse.families.method import IkMethod
+from trajcli.kinematics.inverse.families.method import IkMethod, candidates
 from trajcli.kinematics.inverse.families.screw_axes import PARALLEL, AxisGeometry, axis_geometry
 from trajcli.kinematics.inverse.joint_turns import choose_turns
 from trajcli.kinematics.inverse.solutions import Solutions
