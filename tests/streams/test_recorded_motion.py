@@ -404,7 +404,7 @@ def test_a_real_goal_has_its_points_and_their_rounding():
     motion = found.whole()
     assert found.joints is not None
     assert found.joints[2] == "elbow_joint"
-    np.testing.assert_allclose(found.period.times(0, 5), [0, 0.1, 0.2, 0.3, 0.4], atol=1e-12)
+    np.testing.assert_allclose(motion.t, [0, 0.1, 0.2, 0.3, 0.4], atol=1e-12)
     assert motion.qdd[3].tolist() == [4.1831, -5.0001, 4.6394, -0.0610, -0.2166, 4.2241]
     np.testing.assert_allclose(found.resolution.qd, 0.5e-4)
     # the quintics between the points, from Hermite's six conditions: what the report is about
@@ -436,16 +436,6 @@ def test_files_of_peers(name):
     motion = found.whole()
     np.testing.assert_array_equal(motion.t, numbers[:, 0])
     np.testing.assert_allclose(motion.q, numbers[:, 1:7] * scale, rtol=1e-15)
-    if found.period is not None:
-        rounding = found.resolution.time + 1e-12
-        np.testing.assert_allclose(found.period.times(0, found.rows), motion.t, rtol=0, atol=rounding)
-    assert (found.period is None) == (name == "ruckig")  # whose last row is the end
-
-
-def test_stamps_of_24_hz_lie_on_their_grid():
-    period = open_motion(FILES / "degrees_24hz.csv", units="deg").period
-    assert period.period == 1 / 24
-    assert period.snapped
 
 
 def test_a_chunk_in_single_precision():
@@ -453,7 +443,6 @@ def test_a_chunk_in_single_precision():
     assert found.resolution.relative == (2.0**-24, 0.0, 0.0)
     assert found.resolution.relative_time == 2.0**-24
     assert found.resolution.q.tolist() == [0.0] * 7
-    assert found.period.period == 0.02
     np.testing.assert_array_equal(found.whole().q, np.load(FILES / "chunk_float32.npy")[:, 1:].astype(float))
 
 

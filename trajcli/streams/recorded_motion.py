@@ -23,7 +23,6 @@ from trajcli.streams.recorded.column_units import (
     parse_units,
     scales_of,
 )
-from trajcli.streams.recorded.stamp_period import PeriodFit
 from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, ColumnExtents, RowSource, decimals_of_still
 from trajcli.units import Units
 
@@ -125,7 +124,6 @@ class MotionFile:
         columns: Names of the n columns of each quantity, as they are written.
         quantities: Of q, qd, qdd, qddd, tau and move those that it has.
         resolution: How far its numbers may be rounded.
-        period: The grid of its time stamps; None where they lie on none.
         rows: How many there are.
         largest: Largest magnitudes of the positions, rad or m, shape (n,).
         unread: Names of the columns that are not used.
@@ -170,7 +168,7 @@ class MotionFile:
 
     def _read_all(self, scales: ColumnScales) -> None:
         """Read all rows once, and keep them where they are few."""
-        fit, self.rows, kept = PeriodFit(), 0, 0
+        self.rows = kept = 0
         everywhere = ColumnExtents(len(self._taken))
         for block in self._rows.blocks(self._taken, self._fixed):
             if scales.open:
@@ -181,7 +179,6 @@ class MotionFile:
                 wrong[:, self._move] |= block[:, self._move] % 1 > 0
             if wrong.any():
                 self._refuse(block, *np.argwhere(wrong)[0].tolist())
-            fit.add(block[:, self._time] / self._per_second)
             self.rows += len(block)
             kept += block.size
             if self._kept is not None:
@@ -189,7 +186,6 @@ class MotionFile:
                 self._kept = self._kept if kept <= _KEPT else None
         self.largest = everywhere.largest[self._joints["q"]] * self._factors[self._joints["q"]]
         self.resolution = self._resolution(everywhere)
-        self.period = fit.result(self.resolution.time, self.resolution.relative_time)
 
     def _refuse(self, block: Array, row: int, column: int) -> NoReturn:
         """Refuse a number that no motion has: one that overflows wherever it is used, or a part of a move."""

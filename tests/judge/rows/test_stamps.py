@@ -6,8 +6,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from trajcli.judge.rows.stamps import Stamps, UnfitError
+from trajcli.judge.rows.stamps import Stamps, UnfitError, simplest_between
 
 MICROSECONDS = 5e-7  # half a unit of six decimals
 
@@ -311,3 +313,13 @@ def test_a_last_stamp_that_is_less_than_a_period_behind_is_not_that_before_it() 
     times, exact = Stamps(5e-4, 0.0).taken(t)
     assert (np.diff(times) > 0).all()
     assert exact.tolist() == [True] * 6 + [False]
+
+
+@given(st.fractions(0, 4, max_denominator=40), st.fractions(0, 1, max_denominator=30))
+def test_the_simplest_fraction_has_the_smallest_denominator(low: Fraction, width: Fraction) -> None:
+    if low == 0:
+        return
+    found = simplest_between(low, low + width)
+    assert low <= found <= low + width
+    for denominator in range(1, found.denominator):
+        assert -(-low * denominator // 1) > (low + width) * denominator

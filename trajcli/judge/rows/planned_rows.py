@@ -19,13 +19,13 @@ from trajcli.columns import GROUPS, Column, Group, columns_of, group_of
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable, frozen
 from trajcli.grids import Grid, ListedGrid, UniformGrid
+from trajcli.judge.rows.stamps import simplest_between
 from trajcli.knots import has_knots, knot_grid, knots_of
 from trajcli.planning.plan import Plan
 from trajcli.samples import sample
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_units import SaidUnits, columns_said
-from trajcli.streams.recorded.stamp_period import simplest_between
 from trajcli.streams.recorded_motion import WrittenColumn, blocks_of_size
 from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, ColumnExtents, RowSource, decimals_of_still
 from trajcli.units import Units

@@ -8,13 +8,13 @@ them; where their distances are equal as they are written, it is such a distance
 from __future__ import annotations
 
 from fractions import Fraction
+from math import floor
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import frozen
-from trajcli.streams.recorded.stamp_period import simplest_between
 
 _FEW = 3  # rows that make no period
 _ROUNDING = 4.0  # units in the last place that a sum of periods may be off
@@ -149,3 +149,16 @@ def _origin(first: float, period: float, error: float) -> float:
     steps = np.rint(first / period)
     near = abs(first - steps * period) <= error and abs(steps) < 2**40
     return float(steps * period) if near else first
+
+
+def simplest_between(low: Fraction, high: Fraction) -> Fraction:
+    """Return the fraction of the smallest denominator in an interval of positive numbers.
+
+    Source: Graham, Knuth and Patashnik, Concrete Mathematics (1994), section 6.7.
+    """
+    whole = floor(low)
+    if whole == low:
+        return Fraction(whole)
+    if whole + 1 <= high:
+        return Fraction(whole + 1)
+    return whole + 1 / simplest_between(1 / (high - whole), 1 / (low - whole))
