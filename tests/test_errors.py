@@ -209,7 +209,6 @@ def kinds_of_errors() -> list[type[TrajcliError]]:
 
 MADE_FROM: dict[str, Callable[[type[Any]], Any]] = {
     "StandstillError": lambda kind: kind(0.25),
-    "CornerError": lambda kind: kind(2, Problem("it turns back")),
     "NoLawError": lambda kind: kind("too fast", {1: 0.5}),
 }
 

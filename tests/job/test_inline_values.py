@@ -64,7 +64,7 @@ def test_a_pose_and_a_payload_are_words_or_a_file(given: str, tmp_path: Path) ->
     wanted = [[0, -1, 0, 0.1], [1, 0, 0, 0], [0, 0, 1, -0.05], [0, 0, 0, 1]]
     np.testing.assert_allclose(inline_pose(word(POSE), "--tool", DEG_MM), wanted, atol=1e-15)
     np.testing.assert_allclose(inline_pose(word("{xyz: [1, 2, 3]}"), "--tool", Units())[:3, 3], [1, 2, 3])
-    payload = inline_payload(word(load), "--payload", DEG_MM)
+    payload = inline_payload(word(load), DEG_MM)
     assert (payload.mass, *payload.com) == (2.0, 0.0, 0.01, 0.0)
     np.testing.assert_allclose(payload.inertia, np.diag([1.0, 2.0, 3.0]))  # kg m^2 in any units
 
@@ -89,8 +89,8 @@ ROBOT = Robot(
 
 
 def test_a_target_is_read_in_the_units_and_may_pin_joints() -> None:
-    target = inline_target("{xyz: [100, 0, 50], joints: {slide: 30}}", "--pose", DEG_MM, ROBOT)
+    target = inline_target("{xyz: [100, 0, 50], joints: {slide: 30}}", DEG_MM, ROBOT)
     np.testing.assert_allclose(target.xyz, [0.1, 0, 0.05])
     assert target.pins == pytest.approx({1: 0.03})
     with pytest.raises(InputError, match="fixes nothing"):
-        inline_target("{joints: {turn: 30}}", "--pose", DEG_MM, ROBOT)
+        inline_target("{joints: {turn: 30}}", DEG_MM, ROBOT)

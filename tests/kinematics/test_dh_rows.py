@@ -53,7 +53,7 @@ def poses_of_table(table: DhTable, joints: list[AxisInChain], q: np.ndarray) -> 
 def chain(rng: np.random.Generator, count: int, kind: str) -> tuple[list[AxisInChain], np.ndarray]:
     """Return joints whose axes are any, or at right angles, or parallel, or almost; slides among them."""
     joints = []
-    for k in range(count):
+    for _ in range(count):
         point = rng.uniform(-1, 1, 3) * rng.choice([0, 1], 3)
         if kind == "any":
             rotation, axis = Rotation.random(rng=rng).as_matrix(), rng.normal(size=3)
@@ -65,7 +65,7 @@ def chain(rng: np.random.Generator, count: int, kind: str) -> tuple[list[AxisInC
             axis = np.array([0.0, 0.0, rng.choice([-1.0, 1.0])])
             point = rng.uniform(-1, 1, 3)
         joints.append(
-            AxisInChain(f"j{k}", bool(rng.random() < 0.3), pose(rotation, point), axis / np.linalg.norm(axis))
+            AxisInChain(bool(rng.random() < 0.3), pose(rotation, point), axis / np.linalg.norm(axis))
         )
     tip = pose(Rotation.random(rng=rng).as_matrix() if kind == "any" else np.eye(3), rng.uniform(-1, 1, 3))
     return joints, tip
@@ -99,9 +99,9 @@ def test_a_chain_and_its_rows_move_alike(kind: str, seed: int) -> None:
 
 def two(axis: list[float], point: list[float], slides: bool = False) -> DhTable:
     """Return the table of a turn about z of the root, and a joint with its axis through a point."""
-    first = AxisInChain("a", False, np.eye(4), np.array([0.0, 0.0, 1.0]))
+    first = AxisInChain(False, np.eye(4), np.array([0.0, 0.0, 1.0]))
     size = np.linalg.norm(axis)
-    second = AxisInChain("b", slides, pose(np.eye(3), np.array(point)), np.array(axis) / size)
+    second = AxisInChain(slides, pose(np.eye(3), np.array(point)), np.array(axis) / size)
     return dh_table([first, second], np.eye(4))
 
 
@@ -154,7 +154,7 @@ def test_axes_are_almost_parallel_below_a_thousandth_and_parallel_where_rounding
 
 
 def test_the_last_row_takes_what_it_can_of_the_tool() -> None:
-    joint = AxisInChain("a", False, np.eye(4), np.array([0.0, 0.0, 1.0]))
+    joint = AxisInChain(False, np.eye(4), np.array([0.0, 0.0, 1.0]))
     turn = Rotation.from_euler("z", 0.3).as_matrix()
     upright = dh_table([joint], pose(turn, np.array([0.1, 0.2, 0.4])))
     np.testing.assert_allclose(upright.rows[0], (0.3, 0.4, 0.0, 0.0, 0.0), rtol=0, atol=1e-15)
@@ -172,7 +172,7 @@ def test_the_last_row_takes_what_it_can_of_the_tool() -> None:
 def test_the_base_stands_on_the_first_axis_next_to_the_root(axis, slides) -> None:
     """Its z axis is the joint's and its x axis in the plane of that and the root's x; a slide starts at the root."""
     point = np.array([0.3, -0.2, 0.7])
-    joint = AxisInChain("a", slides, pose(np.eye(3), point), np.array(axis, dtype=float))
+    joint = AxisInChain(slides, pose(np.eye(3), point), np.array(axis, dtype=float))
     base = dh_table([joint], np.eye(4)).base
     np.testing.assert_allclose(base[:3, 2], axis, rtol=0, atol=1e-15)
     z = base[:3, 2]

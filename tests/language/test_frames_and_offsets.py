@@ -385,10 +385,10 @@ def test_a_whole_matrix_in_a_frame_has_its_position_there(frame: str) -> None:
 def test_joints_beside_a_pose_that_is_asked_for_are_some_by_name() -> None:
     robot = read("  j: {joints: 0}\n").robot
     text = "{xyz: [1, 2, 3], joints: JOINTS}"
-    asked = inline_target(text.replace("JOINTS", "{elbow_joint: 30}"), "--pose", Units("deg", "mm"), robot)
+    asked = inline_target(text.replace("JOINTS", "{elbow_joint: 30}"), Units("deg", "mm"), robot)
     assert asked.pins == pytest.approx({2: np.radians(30)})
     for joints in ("[1, 2, 3, 4, 5, 6]", "3", str(dict.fromkeys(robot.joint_names, 1)).replace("'", "")):
         with pytest.raises(InputError, match="beside a pose `joints` pins some joints by name"):
-            inline_target(text.replace("JOINTS", joints), "--pose", Units("deg", "mm"), robot)
+            inline_target(text.replace("JOINTS", joints), Units("deg", "mm"), robot)
     with pytest.raises(InputError, match="the target fixes nothing"):
-        inline_target("{joints: {elbow_joint: 30}}", "--pose", Units(), robot)
+        inline_target("{joints: {elbow_joint: 30}}", Units(), robot)

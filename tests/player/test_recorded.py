@@ -127,7 +127,7 @@ def test_what_a_judge_says_stands_at_its_time_or_at_the_start_of_the_file(tmp_pa
         Finding("velocity", joint="j1", value=1.0, time=6.0, severity="warning"),
     )
     judgement = Judgement(found, "linear", 3, notes=("a note",))
-    checked = CheckedFile(judgement, robot, Units(), None, None, None)  # type: ignore[arg-type]
+    checked = CheckedFile(judgement, robot, Units(), None, None)  # type: ignore[arg-type]
     (tmp_path / "rows.csv").write_text("t,q1,q2\n5,0,0\n6,1,0\n8,0,0\n")
     shown = scene_of_file(str(tmp_path / "rows.csv"), robot, checked)
     assert (shown["verdict"]["state"], shown["verdict"]["text"]) == ("violated", "3 findings")

@@ -123,7 +123,7 @@ def test_steps_are_read_with_their_frames_and_inverted():
     assert composed(steps) == pytest.approx(np.linalg.inv(second) @ first)
     assert steps[0].typed == TypedAngles("XYZ", "fixed", tuple(np.radians([10.0, 20.0, 30.0]).tolist()))
     assert steps[1].typed is None  # the angles are not those of the inverse
-    euler = read_end("{euler: {sequence: ZYX, frame: fixed, angles: [1, 2, 3]}}", "--to", Units())
+    euler = read_end("{euler: {sequence: ZYX, frame: fixed, angles: [1, 2, 3]}}", Units())
     assert euler.typed == TypedAngles("ZYX", "fixed", (1.0, 2.0, 3.0))
 
 

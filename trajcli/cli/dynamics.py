@@ -33,7 +33,7 @@ def run_dynamics(options: DynamicsCommand) -> int:
     """
     arm = open_arm(options.robot, options.tool, base=options.base, units=options.units, si=options.si)
     if options.payload is not None:
-        payload = inline_payload(options.payload, "--payload", arm.units)
+        payload = inline_payload(options.payload, arm.units)
         arm = replace(arm, robot=replace(arm.robot, payload=payload))
     if options.joints == ["-"]:
         return _stream(arm, options)

@@ -40,7 +40,7 @@ def run_ik(options: IkCommand) -> int:
         _remark_on(arm, near)
     if options.pose is None:
         return _stream(arm, near, options)
-    asked = inline_target(options.pose, "--pose", arm.units, arm.robot)
+    asked = inline_target(options.pose, arm.units, arm.robot)
     target = Wanted(ik_target(asked), asked.pins, asked.configuration)
     solutions, chosen = find_answers(arm, target, near, options.tolerance)
     reports = answer_reports(arm, solutions, chosen, target, near, every=options.every, turns=options.turns)

@@ -49,7 +49,7 @@ def run_pose(options: PoseCommand) -> int:
         else:
             print_lines(_lines(report, units, options, float(rotation_defect(start.pose[:3, :3]))))
         return 0
-    target = read_end(options.to, "--to", units)
+    target = read_end(options.to, units)
     s = parse_fractions("0,0.5,1" if options.s is None else options.s)
     poses = pose_path(
         start,

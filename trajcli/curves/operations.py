@@ -39,7 +39,7 @@ def merge_breaks(curves: Sequence[PiecewisePolynomial]) -> PiecewisePolynomial:
     if any(curve.start - start > apart or end - curve.end > apart for curve in curves):
         raise ValueError(f"curves to merge must all cover [{start!r}, {end!r}]")
     columns = [(curve, k) for curve in curves for k in range(curve.dimension)]
-    values = stacked([curve.coefficients[:, :, k, None] for curve, k in columns], axis=1)
+    values = stacked([curve.coefficients[:, :, k, None] for curve, k in columns])
     return merge_pieces([curve.breaks for curve, _ in columns], values[:, :, 0])
 
 
@@ -83,8 +83,8 @@ def _united(times: Array, owners: np.ndarray, apart: float) -> tuple[Array, np.n
     return np.array(kept), index_of
 
 
-def stacked(coefficients: Sequence[Array], axis: int = 2) -> Array:
-    """Return coefficients (degree + 1, pieces, n) beside each other, filled up to the highest degree."""
+def stacked(coefficients: Sequence[Array]) -> Array:
+    """Return coefficients (degree + 1, pieces, n), one after the other, filled up to the highest degree."""
     rows = max(block.shape[0] for block in coefficients)
     filled = [
         np.concatenate([np.zeros((rows - block.shape[0], *block.shape[1:])), block])
@@ -92,7 +92,7 @@ def stacked(coefficients: Sequence[Array], axis: int = 2) -> Array:
         else block
         for block in coefficients
     ]
-    return np.concatenate(filled, axis=axis)
+    return np.concatenate(filled, axis=1)
 
 
 def scale_time(curve: PiecewisePolynomial, factor: float) -> PiecewisePolynomial:

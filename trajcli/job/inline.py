@@ -83,12 +83,11 @@ def inline_pose(word: str, name: str, units: Units) -> Array:
     return read_at(document, units, Pose(name).read)
 
 
-def inline_target(word: str, name: str, units: Units, robot: Robot) -> AskedPose:
-    """Return the target that a word describes; what it leaves out is free.
+def inline_target(word: str, units: Units, robot: Robot) -> AskedPose:
+    """Return the target that the word behind --pose describes; what it leaves out is free.
 
     Args:
         word: YAML, or @FILE.
-        name: What the word is called in messages.
         units: Of plain numbers.
         robot: Whose joints may be pinned.
 
@@ -96,7 +95,7 @@ def inline_target(word: str, name: str, units: Units, robot: Robot) -> AskedPose
         InputError: When it is no pose, or says nothing.
         FileError: When the file cannot be read.
     """
-    document = inline_document(word, name)
+    document = inline_document(word, "--pose")
     context = ReadingContext(units, robot.joint_names, robot.joint_types)
     target = validated(AskedPose, document.plain(), document, context)
     if not target.gives_pose:
@@ -105,19 +104,18 @@ def inline_target(word: str, name: str, units: Units, robot: Robot) -> AskedPose
     return target
 
 
-def inline_payload(word: str, name: str, units: Units) -> Payload:
-    """Return the payload that a word describes.
+def inline_payload(word: str, units: Units) -> Payload:
+    """Return the payload that the word behind --payload describes.
 
     Args:
         word: As under `attach` in a job, or @FILE.
-        name: What the word is called in messages.
         units: Of plain numbers; its mass and inertia are in kg and kg m^2 in any.
 
     Raises:
         InputError: When it is no payload, or one that no solid has.
         FileError: When the file cannot be read.
     """
-    document = inline_document(word, name)
+    document = inline_document(word, "--payload")
     return validated(PayloadSpec, document.plain(), document, ReadingContext(units)).as_payload()
 
 

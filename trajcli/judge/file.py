@@ -67,7 +67,6 @@ class CheckedFile:
         judgement: Of its motion.
         robot: With the limits that it was judged by.
         units: For people.
-        loaded: The job; None without one.
         plan: Of the job, where it has one.
         motion: The file, to read from anew.
     """
@@ -75,7 +74,6 @@ class CheckedFile:
     judgement: Judgement
     robot: Robot
     units: Units
-    loaded: LoadedJob | None
     plan: Plan | None
     motion: MotionFile
 
@@ -146,7 +144,7 @@ def check_file(
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)
     judged = replace(_beside_plan(judged, compared, options), planned_with=planned_with)
-    return CheckedFile(judged, robot, shown, given.loaded, given.plan, motion)
+    return CheckedFile(judged, robot, shown, given.plan, motion)
 
 
 def _rate_of(word: str | None) -> float | None:
@@ -416,7 +414,7 @@ def _carrying(given: _Given, options: CheckOptions) -> _Given:
     from trajcli.job.inline import inline_payload
     from trajcli.job.limits import own_efforts
 
-    payload = inline_payload(options.payload, "--payload", _said_units(options, given.shown or given.units))
+    payload = inline_payload(options.payload, _said_units(options, given.shown or given.units))
     robot = replace(given.robot, payload=payload)
     if not robot.limits.has_effort:
         robot = replace(robot, limits=replace(robot.limits, effort=own_efforts(robot)))

@@ -31,13 +31,11 @@ class AxisInChain:
     """A joint that moves, with the fixed joints before it folded in.
 
     Attributes:
-        name: Of the joint.
         prismatic: Whether it slides.
         origin: Pose of its frame in that of the joint before at zero, or in the root, shape (4, 4).
         axis: Unit vector in its frame, shape (3,).
     """
 
-    name: str
     prismatic: bool
     origin: Array
     axis: Array

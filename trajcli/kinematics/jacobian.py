@@ -222,16 +222,14 @@ def tcp_twist(robot: Robot, q: ArrayLike, qd: ArrayLike, frame: ReferenceFrame =
     return np.asarray((jacobian(robot, values, frame) @ rates[..., None])[..., 0])
 
 
-def tcp_acceleration(
-    robot: Robot, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, frame: ReferenceFrame = "world"
-) -> Array:
-    """Return the tcp's acceleration (a, e), shape (*batch, 6), m/s^2 and rad/s^2, in the axes of `frame`.
+def tcp_acceleration(robot: Robot, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
+    """Return the tcp's acceleration (a, e) in world, shape (*batch, 6), m/s^2 and rad/s^2.
 
     Raises:
         InputError: When the robot has no geometry, or q, qd and qdd have not n finite values of one batch.
     """
     values, second = _state(robot, q, qdd)
-    return np.asarray(tcp_twist(robot, values, second, frame) + jacobian_dot_qd(robot, values, qd, frame))
+    return np.asarray(tcp_twist(robot, values, second) + jacobian_dot_qd(robot, values, qd))
 
 
 def _state(robot: Robot, q: ArrayLike, rates: ArrayLike) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -55,10 +55,7 @@ def annotations_of(error: TrajcliError, file: str | None = None) -> tuple[Proble
 
 
 def render_annotations(
-    problems: Sequence[Problem],
-    form: AnnotationForm,
-    subjects: Sequence[str] = (),
-    rules: Mapping[str, str] | None = None,
+    problems: Sequence[Problem], form: AnnotationForm, subjects: Sequence[str] = ()
 ) -> str:
     """Return a text for a service of continuous integration; it ends in a line feed unless it is empty.
 
@@ -66,14 +63,13 @@ def render_annotations(
         problems: What was found, each with its kind; a place in line 0 is the whole file.
         form: "github" gives one line for each; "junit" and "sarif" one document, whatever was found.
         subjects: The files that were judged: JUnit names those, too, with which nothing is wrong.
-        rules: What was judged, with a sentence about each; what is annotated besides is added.
     """
-    rules, problems = rules or {}, [_with_all_said(problem) for problem in problems]
+    problems = [_with_all_said(problem) for problem in problems]
     if form == "github":
         return "".join(f"{_github(problem)}\n" for problem in problems)
     if form == "junit":
-        return _junit(problems, subjects, tuple(rules))
-    return json.dumps(_sarif(problems, rules), ensure_ascii=False, indent=2, allow_nan=False) + "\n"
+        return _junit(problems, subjects)
+    return json.dumps(_sarif(problems), ensure_ascii=False, indent=2, allow_nan=False) + "\n"
 
 
 def _with_all_said(problem: Problem) -> Problem:
@@ -119,8 +115,8 @@ def _escaped(match: re.Match[str]) -> str:
     return match[0].encode("unicode_escape", "backslashreplace").decode("ascii")
 
 
-def _junit(problems: Sequence[Problem], subjects: Sequence[str], rules: Sequence[str]) -> str:
-    """Return a JUnit document: a suite for each file, in it a case for each rule and each problem."""
+def _junit(problems: Sequence[Problem], subjects: Sequence[str]) -> str:
+    """Return a JUnit document: a suite for each file, in it a case for each problem, one if all is right."""
     from xml.etree import ElementTree as ET
 
     files = dict.fromkeys([*subjects, *(_place(problem).file for problem in problems)])
@@ -128,10 +124,8 @@ def _junit(problems: Sequence[Problem], subjects: Sequence[str], rules: Sequence
     for file in files or {"": None}:
         of_file = [problem for problem in problems if _place(problem).file == file]
         suite = ET.SubElement(root, "testsuite", {"name": _xml(file) or "trajcli"})
-        broken = {str(problem.kind) for problem in of_file}
-        failed = any(problem.severity == "error" for problem in of_file)
-        for rule in [rule for rule in rules if rule not in broken] or ["verification"][failed:]:
-            ET.SubElement(suite, "testcase", _case(file, rule))
+        if all(problem.severity != "error" for problem in of_file):
+            ET.SubElement(suite, "testcase", _case(file, "verification"))
         for name, problem in _numbered(of_file):
             case = ET.SubElement(suite, "testcase", _case(file, name))
             _add_outcome(case, problem)
@@ -180,16 +174,16 @@ def _xml(text: str) -> str:
     return _NO_XML.sub(_escaped, text)
 
 
-def _sarif(problems: Sequence[Problem], rules: Mapping[str, str]) -> dict[str, Any]:
+def _sarif(problems: Sequence[Problem]) -> dict[str, Any]:
     """Return a log of the Static Analysis Results Interchange Format.
 
     Source: OASIS, "Static Analysis Results Interchange Format (SARIF) Version 2.1.0", 2020.
     """
-    names = list(dict.fromkeys([*rules, *(str(problem.kind) for problem in problems)]))
+    names = list(dict.fromkeys(str(problem.kind) for problem in problems))
     driver = {
         "name": "trajcli",
         "version": __version__,
-        "rules": [_sarif_rule(name, rules.get(name)) for name in names],
+        "rules": [_sarif_rule(name) for name in names],
     }
     run = {
         "tool": {"driver": driver},
@@ -199,8 +193,8 @@ def _sarif(problems: Sequence[Problem], rules: Mapping[str, str]) -> dict[str, A
     return {"$schema": _SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
 
 
-def _sarif_rule(name: str, sentence: str | None) -> dict[str, Any]:
-    text = {"text": sentence or f"A finding of the kind {name.replace('_', ' ')}."}
+def _sarif_rule(name: str) -> dict[str, Any]:
+    text = {"text": f"A finding of the kind {name.replace('_', ' ')}."}
     return {"id": name, "shortDescription": text, "fullDescription": text, "help": text}
 
 

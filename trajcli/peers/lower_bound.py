@@ -15,7 +15,7 @@ from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Limits
 from trajcli.limits.tolerances import exceeds
 from trajcli.peers.path_reference import LimitBreach, breaches_of
-from trajcli.planners.ruckig import BoundaryProblem, fastest
+from trajcli.planners.ruckig import BoundaryProblem, fastest, inside
 from trajcli.trajectory import State
 
 _Alone = tuple[int, PiecewisePolynomial, Limits]  # a joint, its motion by itself, and its limits
@@ -129,7 +129,7 @@ def _breaches(motions: Sequence[_Alone]) -> Iterator[LimitBreach]:
         return
     curves = [curve for _, curve, _ in motions]
     owner = np.repeat(np.arange(len(curves)), [curve.pieces for curve in curves])
-    polynomials = stacked([curve.coefficients for curve in curves], axis=1)
+    polynomials = stacked([curve.coefficients for curve in curves])
     lengths, passed = np.concatenate([curve.lengths for curve in curves]), np.zeros(owner.size, dtype=bool)
     for order, (low, high) in enumerate(piece_extremes(polynomials, lengths, _ORDERS)):
         bounds = np.concatenate([limits.of_order(order) for *_, limits in motions])[owner]
@@ -147,17 +147,13 @@ def _problem(start: State, end: State, limits: Limits, joint: int) -> BoundaryPr
     ends = []
     for state in (start, end):
         rates = float(state.velocity[joint]), counts * float(state.acceleration[joint])
-        velocity, acceleration = (_onto(*each) for each in zip(rates, bounds[:2].tolist(), strict=True))
+        velocity, acceleration = (
+            inside(rate, *limit) for rate, limit in zip(rates, bounds[:2].tolist(), strict=True)
+        )
         ends.append((float(state.position[joint]), velocity, acceleration))
     if abs(ends[1][0] - ends[0][0]) <= _NOWHERE:
         ends[1] = (ends[0][0], *ends[1][1:])
     return BoundaryProblem(f"joint {joint + 1}", ends[0], ends[1], bounds)
-
-
-def _onto(value: float, bounds: Sequence[float]) -> float:
-    """Return a value laid onto the bound that it exceeds by rounding."""
-    inside = min(max(value, bounds[0]), bounds[1])
-    return inside if abs(value - inside) <= _ROUNDING * abs(value) else value
 
 
 def _hardly_moves(problem: BoundaryProblem) -> bool:

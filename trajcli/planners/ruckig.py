@@ -418,9 +418,9 @@ def _call_ruckig(
     wanted.current_position, wanted.target_position = [0.0], [asked.displacement / length_unit]
     wanted.current_velocity = [initial[0] / velocity]
     wanted.current_acceleration = [initial[1] / acceleration]
-    wanted.target_velocity = [_inside(problem.final[1] / velocity, lower[0], upper[0])]
+    wanted.target_velocity = [inside(problem.final[1] / velocity, lower[0], upper[0])]
     reached = problem.final[2] / acceleration if problem.order == 3 else 0.0  # else none is too high
-    wanted.target_acceleration = [_inside(reached, lower[1], upper[1])]
+    wanted.target_acceleration = [inside(reached, lower[1], upper[1])]
     wanted.min_velocity, wanted.max_velocity = [lower[0]], [upper[0]]
     wanted.min_acceleration, wanted.max_acceleration = [lower[1]], [upper[1]]
     wanted.max_jerk = [min(-lower[2], upper[2])]
@@ -466,10 +466,10 @@ def _askable(problem: BoundaryProblem, units: Sequence[float]) -> BoundaryProble
     return None if unlike <= min(0.1, hidden) else problem
 
 
-def _inside(value: float, lower: float, upper: float) -> float:
+def inside(value: float, lower: float, upper: float) -> float:
     """Return the value, laid onto the bound that it exceeds by rounding."""
-    inside = min(max(value, lower), upper)
-    return inside if abs(value - inside) <= _ROUNDING * abs(value) else value
+    laid = min(max(value, lower), upper)
+    return laid if abs(value - laid) <= _ROUNDING * abs(value) else value
 
 
 def _profile(

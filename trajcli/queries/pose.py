@@ -89,14 +89,14 @@ def read_steps(words: Sequence[str], units: Units) -> list[PoseStep]:
     return [read_at(document, units, _step) for document in documents]
 
 
-def read_end(word: str, name: str, units: Units) -> PoseStep:
-    """Return the pose that one word describes, without `frame` and `invert`.
+def read_end(word: str, units: Units) -> PoseStep:
+    """Return the pose that the word behind --to describes, without `frame` and `invert`.
 
     Raises:
         InputError: When it is no pose.
         FileError: When its file cannot be read.
     """
-    return read_at(inline_document(word, name), units, _end)
+    return read_at(inline_document(word, "--to"), units, _end)
 
 
 def composed(steps: Sequence[PoseStep]) -> Array:

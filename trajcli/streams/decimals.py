@@ -170,16 +170,15 @@ def _trailing_words() -> _Words:
 @cache
 def _fraction_tables() -> tuple[_Words, _Words, _Words]:
     """Return the words of the first three decimals, of the next four, and of the last two with a comma."""
-    first, last = _digits(1000, 4), _digits(100, 4)
+    first, last = _digits(1000), _digits(100)
     first[:, 0] = ord(".")
     last[:] = np.column_stack([last[:, 2:], np.full(100, ord(",")), np.zeros(100)])
-    return _as_words(first), _as_words(_digits(10000, 4)), _as_words(last)
+    return _as_words(first), _as_words(_digits(10000)), _as_words(last)
 
 
-def _digits(count: int, width: int) -> NDArray[np.uint8]:
-    """Return the numbers below `count` as digits, shape (count, width), with leading zeros."""
-    powers = 10 ** np.arange(width - 1, -1, -1)
-    return (np.arange(count)[:, None] // powers % 10 + ord("0")).astype(np.uint8)
+def _digits(count: int) -> NDArray[np.uint8]:
+    """Return the numbers below `count` as digits, shape (count, 4), with leading zeros."""
+    return (np.arange(count)[:, None] // [1000, 100, 10, 1] % 10 + ord("0")).astype(np.uint8)
 
 
 def _as_words(characters: NDArray[np.uint8]) -> _Words:

@@ -121,11 +121,9 @@ class MotionFile:
         source: Its name, for messages.
         format: "csv", "jsonl", "ros", "mcap", "npy" or "fields", as of `RowSource`.
         joints: n names; None where the file says none.
-        columns: Names of the n columns of each quantity, as they are written.
         quantities: Of q, qd, qdd, qddd, tau and move those that it has.
         resolution: How far its numbers may be rounded.
         rows: How many there are.
-        largest: Largest magnitudes of the positions, rad or m, shape (n,).
         unread: Names of the columns that are not used.
         notes: Sentences about what was taken for what, and what was left out.
     """
@@ -155,10 +153,6 @@ class MotionFile:
         self._bounds = np.full(len(self._taken), _LARGEST)
         self._bounds[[] if self._move is None else self._move] = _LAST_MOVE
         self.source, self.format, self.joints = rows.named.file, rows.format, names
-        self.columns = {
-            key: tuple(rows.named.names[found[joint]] for joint in order)
-            for key, found in roles.joints.items()
-        }
         self.quantities = (*roles.joints, *((MOVE,) if self._move is not None else ()))
         self.unread = roles.unread
         self._message_joints = rows.joint_names if rows.format == "ros" else None
@@ -184,7 +178,6 @@ class MotionFile:
             if self._kept is not None:
                 self._kept.append(block)
                 self._kept = self._kept if kept <= _KEPT else None
-        self.largest = everywhere.largest[self._joints["q"]] * self._factors[self._joints["q"]]
         self.resolution = self._resolution(everywhere)
 
     def _refuse(self, block: Array, row: int, column: int) -> NoReturn:

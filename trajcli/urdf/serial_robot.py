@@ -186,7 +186,7 @@ def _axes(
     for joint, origin in zip(path.joints, origins, strict=True):
         pose = pose @ origin
         if joint.moves:
-            axes.append(AxisInChain(joint.name, joint.type == "prismatic", pose, _axis(document, joint)))
+            axes.append(AxisInChain(joint.type == "prismatic", pose, _axis(document, joint)))
             pose = np.eye(4)
     return axes, pose
 

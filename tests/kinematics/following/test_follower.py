@@ -108,10 +108,6 @@ def test_a_guess_on_no_branch_is_lost_with_its_place():
     with pytest.raises(LostError) as caught:
         arm.exact(s, "right", guess)
     np.testing.assert_array_equal(caught.value.s, [0.02, 0.03])
-    with pytest.raises(LostError) as alone:
-        arm.exact(s[2:], "right", guess[2:])
-    np.testing.assert_allclose(caught.value.joints, alone.value.joints, rtol=0, atol=1e-9)
-    assert caught.value.joints.shape == (6,)
 
 
 def test_out_of_reach_is_lost_with_the_distance():
@@ -128,7 +124,7 @@ def test_out_of_reach_is_lost_with_the_distance():
 
     with pytest.raises(LostError) as caught:
         type(arm)(arm.robot, stretched, arm.start, arm.held).exact(np.array([0.01]), "right", far.start[None])
-    assert caught.value.missed[0] > 0.1
+    assert caught.value.s.tolist() == [0.01]
 
 
 def test_the_other_branch_is_no_answer():
@@ -150,11 +146,9 @@ def test_the_other_branch_is_no_answer():
         with pytest.raises(LostError) as caught:  # one of two is enough, and it is the one that is told
             arm.exact(places, "right", guesses)
         assert caught.value.s.tolist() == [0.0]
-        assert caught.value.joints == pytest.approx(mirror)
     with pytest.raises(LostError) as caught:
         arm.exact(np.array([1e-3, 0.0]), "right", np.stack([mirror, mirror]))
     assert caught.value.s.tolist() == [0.0, 1e-3]
-    assert caught.value.joints == pytest.approx(mirror, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["puma560, direction", "ur5e, direction of x", "panda, direction"])
@@ -182,14 +176,14 @@ def test_joint_values_that_are_a_quarter_of_a_radian_from_the_guess_are_another_
         else:
             with pytest.raises(LostError) as caught:
                 arm.exact(np.zeros(1), "right", guess[None])
-            assert caught.value.joints == pytest.approx(made.start, abs=1e-6)
+            assert caught.value.s.tolist() == [0.0]
 
 
 def test_an_orientation_that_is_missed_alone_is_lost():
     made = case("cartesian", [0.3, 0.2, 0.4], turn=(0.01, 0.0, 0.0))
     with pytest.raises(LostError) as caught:
         followed(made).exact(np.array([made.path.length]), "right", made.start[None] + 0.05)
-    assert caught.value.missed == pytest.approx((0.0, 0.01), abs=1e-9)
+    assert caught.value.s.tolist() == [made.path.length]
 
 
 @pytest.mark.parametrize("beyond", [1e-3, 1e-6, -1e-6, 3e-9])
@@ -204,9 +198,8 @@ def test_a_little_out_of_reach_is_lost_too(beyond):
         reference.poses[:, 0, 3] += beyond
         return reference
 
-    with pytest.raises(LostError) as caught:
+    with pytest.raises(LostError):
         type(arm)(arm.robot, further, arm.start, arm.held).exact(np.zeros(1), "right", made.start[None])
-    assert caught.value.missed[0] == pytest.approx(abs(beyond), rel=0.5)
 
 
 def test_the_aspect_of_dependent_rows_is_told_where_they_span_the_same_space():

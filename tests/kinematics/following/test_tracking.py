@@ -135,8 +135,6 @@ def test_it_is_stuck_where_the_reach_ends():
     edge = np.sqrt((L1 + L2) ** 2 - 0.35**2) - 0.05
     assert edge - 1e-5 < caught.value.s < edge
     assert 0 < caught.value.joints[1] < 0.02
-    assert caught.value.lost is not None
-    assert edge < caught.value.lost.s[0] < edge + 1e-4
     y, elbow = 0.05 + caught.value.s, caught.value.joints[1]
     assert elbow == pytest.approx(elbow_of(np.hypot(0.35, y)), rel=1e-9)
     assert caught.value.rates[1] == pytest.approx(
@@ -258,12 +256,11 @@ class Lost(Given):
 
 @pytest.mark.parametrize("lost", [[0], [1], [0, 1]])
 def test_joints_that_are_lost_anywhere_are_lost(lost):
-    """In one of two places, or in both; the guess that is named is that of the first of them."""
+    """In one of two places, or in both."""
     s, guess = np.array([0.5, 1.0]), np.array([[1.0, 2.0], [3.0, 4.0]])
     with pytest.raises(LostError) as caught:
         tracking._exact(Lost(lost), s, "right", guess)
     assert np.atleast_1d(caught.value.s).tolist() == s[lost].tolist()
-    assert caught.value.joints.tolist() == guess[lost[0]].tolist()
     tracking._exact(Lost([]), s, "right", guess)
 
 

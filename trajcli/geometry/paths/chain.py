@@ -217,15 +217,7 @@ class Chain:
 
 
 class CornerError(PlanningError):
-    """A corner between two segments cannot be rounded as it is asked for.
-
-    Attributes:
-        index: Of the segment that ends in the corner.
-    """
-
-    def __init__(self, index: int, *problems: Problem) -> None:
-        super().__init__(*problems)
-        self.index = index
+    """A corner between two segments cannot be rounded as it is asked for."""
 
 
 def join(segments: Sequence[PositionCurve], radii: ArrayLike = 0.0) -> Chain:
@@ -301,7 +293,7 @@ def _blend(index: int, before: PositionCurve, after: PositionCurve, radius: floa
         (why,) = error.problems
         text = f"corner {index + 1} of the path, at {{where}}: {why.message}"
         amounts = {**why.amounts, "where": shown_position(after.evaluate(np.zeros(1))[0][0])}
-        raise CornerError(index, replace(why, message=text, amounts=amounts)) from error
+        raise CornerError(replace(why, message=text, amounts=amounts)) from error
 
 
 def _check_joints(segments: Sequence[PositionCurve]) -> None:

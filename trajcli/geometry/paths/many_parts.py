@@ -26,14 +26,12 @@ class ManyParts:
     """Parts of a chain, m of them.
 
     Attributes:
-        parts: All of them.
         kinds: Of each part, shape (m,): straight, rounded, or another one.
         numbers: Of each part within the table of its kind, shape (m,).
         lines: The straight parts.
         blends: The rounded ones.
     """
 
-    parts: Sequence[PositionCurve]
     kinds: Indices
     numbers: Indices
     lines: _Lines
@@ -164,7 +162,7 @@ def many_parts(parts: Sequence[PositionCurve]) -> ManyParts:
         elif isinstance(part, Blend):
             kinds[k], numbers[k] = _ROUNDED, len(blends)
             blends.append(part)
-    return ManyParts(parts, kinds, numbers, _table_of_lines(lines), _table_of_blends(blends))
+    return ManyParts(kinds, numbers, _table_of_lines(lines), _table_of_blends(blends))
 
 
 def _table_of_lines(lines: Sequence[tuple[Line, float]]) -> _Lines:

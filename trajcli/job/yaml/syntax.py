@@ -21,7 +21,6 @@ _HAS_VALUE = re.compile(r""":\s+[^\s#|>&!]""")
 class _Complaint(NamedTuple):
     """What the parser said: lines and columns count from 0 here."""
 
-    text: str
     context: tuple[int, int]
     problem: tuple[int, int]
     lines: Sequence[str]
@@ -54,7 +53,7 @@ def syntax_problem(error: Exception, file: str, lines: Sequence[str]) -> Problem
     context = _mark(error, "context_mark") or problem
     words = [getattr(error, name, None) for name in ("context", "problem")]
     text = "; ".join(word for word in words if word) or str(error)
-    complaint = _Complaint(text, context, problem, lines)
+    complaint = _Complaint(context, problem, lines)
     for pattern, judge in _RULES:
         if pattern.search(text):
             verdict = judge(complaint)

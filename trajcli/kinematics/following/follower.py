@@ -53,15 +53,11 @@ class LostError(ValueError):
 
     Attributes:
         s: All values where that is so, ascending, shape (K,).
-        joints: The nearest ones at the first of them, shape (n,).
-        missed: By how much it misses there: m, rad.
     """
 
-    def __init__(self, s: Array, joints: Array, missed: tuple[float, float]) -> None:
+    def __init__(self, s: Array) -> None:
         super().__init__(f"no joint values meet the target at {s[0]!r}")
         self.s = s
-        self.joints = joints
-        self.missed = missed
 
 
 @frozen
@@ -150,8 +146,7 @@ class Follower:
         q, poses, jacobians, slopes = self._solve_target(reference, target, guess, s)
         left = self.aspect.changed(reference, poses, slopes)
         if left.any():
-            first_left = int(np.flatnonzero(left)[np.argmin(s[left])])
-            raise LostError(np.sort(s[left]), q[first_left], (0.0, 0.0))
+            raise LostError(np.sort(s[left]))
         pins = (None, None) if reference.pins is None else reference.pins[1:]
         first = self._solve_rows(slopes, self._scaled(reference.rates(), target, pins=pins[0]))
         bias = acceleration_bias(jacobians, first)
@@ -168,9 +163,8 @@ class Follower:
         for iteration in range(_ITERATIONS + 1):
             poses, jacobians = linearisation(self.robot, q)
             slopes = self._rows(target, poses, jacobians, reference.pinned)
-            differences = residuals(target, poses)
             pins = None if reference.pins is None else reference.pins[0] - q[:, list(reference.pinned)]
-            errors = self._scaled(differences, target, (self.start - q) @ self.held.T, pins=pins)
+            errors = self._scaled(residuals(target, poses), target, (self.start - q) @ self.held.T, pins=pins)
             if short or iteration == _ITERATIONS:
                 break
             step = self._solve_rows(slopes, errors)
@@ -179,11 +173,7 @@ class Follower:
         size = np.abs(errors).max(axis=1)
         lost = ~(size <= _GOOD) | (np.abs(q - guess).max(axis=1) > _ELSEWHERE)
         if lost.any():
-            first = int(np.flatnonzero(lost)[np.argmin(s[lost])])
-            split = sum(target.position)
-            parts = differences[first, :split], differences[first, split:]
-            missed = float(np.linalg.norm(parts[0])), float(np.linalg.norm(parts[1]))
-            raise LostError(np.sort(s[lost]), q[first], missed)
+            raise LostError(np.sort(s[lost]))
         return q, poses, jacobians, slopes
 
     def rows(self, reference: ToolReference, poses: Array, jacobians: Array) -> Array:

@@ -35,15 +35,13 @@ class StuckError(ValueError):
         s: How far the path could be followed.
         joints: Joint values there, shape (n,).
         rates: Their derivative along the path there, shape (n,).
-        lost: Why the next step failed, where no joint values met the target; None where they jumped.
     """
 
-    def __init__(self, s: float, joints: Array, rates: Array, lost: LostError | None) -> None:
+    def __init__(self, s: float, joints: Array, rates: Array) -> None:
         super().__init__(f"the joints cannot be followed beyond {s!r}")
         self.s = s
         self.joints = joints
         self.rates = rates
-        self.lost = lost
 
 
 def track_branch(follower: Follower, breaks: Array) -> PiecewisePolynomial:
@@ -70,13 +68,12 @@ def track_branch(follower: Follower, breaks: Array) -> PiecewisePolynomial:
             step = end - s if travel > _WHOLE * (end - s) * speed else travel / speed
             try:
                 exact, deviation = _attempt(follower, s, step, state)
-                lost = None
-            except LostError as error:
-                deviation, lost = np.inf, error
+            except LostError:
+                deviation = np.inf
             if deviation > _JUMPED:
                 travel = 0.3 * step * speed
                 if 0.3 * step < shortest:
-                    raise StuckError(s, state[0], state[1], lost)
+                    raise StuckError(s, state[0], state[1])
                 continue
             middle, last = exact[:, 0], exact[:, 1]
             pieces += [
@@ -149,5 +146,5 @@ def _exact(follower: Follower, s: Array, side: Side, guess: Array) -> Array:
     values = follower.exact(s, side, guess)
     broken = ~np.isfinite(values).all(axis=(0, 2))
     if broken.any():
-        raise LostError(s[broken], guess[broken][0], (0.0, 0.0))
+        raise LostError(s[broken])
     return values

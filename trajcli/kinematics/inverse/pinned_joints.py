@@ -109,7 +109,7 @@ def _with_new_rows(robot: Robot, others: Sequence[int], pins: Mapping[int, float
     for joint, frame in zip(others, _axis_frames(robot, others, pins), strict=True):
         own = robot.joints[joint]
         origin, axis = np.linalg.inv(before) @ frame, np.array([0.0, 0.0, float(own.sign)])
-        axes.append(AxisInChain(own.name, own.type == "prismatic", origin, axis))
+        axes.append(AxisInChain(own.type == "prismatic", origin, axis))
         before = frame
     whole = _chain(robot, range(len(robot.joints)), pins) @ robot.tool
     table = dh_table(axes, np.linalg.inv(before) @ whole)

@@ -227,7 +227,6 @@ class _Log:
             record = message_record(topics[topic], time, message, counts[topic])
             self._latched.append((topics[topic], time, record))
             counts[topic] += 1
-        self._origin = recording.origin
         # of a chunk: a new one each time would cost as much as filling it
         self._buffer = np.empty(0, np.uint8)
         self._write(records.MAGIC + records.record(records.HEADER, *map(records.text, (PROFILE, LIBRARY))))

@@ -244,7 +244,8 @@ class _Assignment:
             self._chosen["q"] = next(iter(groups.values()))
             return self._chosen["q"]
         if groups:
-            self._refuse("the positions are ambiguous", groups)
+            choices = [self._text(kind, stem) for kind, stem in groups]
+            self._refuse("the positions are ambiguous", groups, choices)
         named = self._listed(dict(enumerate(range(len(self._names)))))
         hint = f"it has {named}; name them: --columns q=... or q1=NAME,q2=NAME"
         for quantity in ("qd", "qdd"):  # where one letter says it, as in the axes A1 and A2
@@ -255,10 +256,11 @@ class _Assignment:
             hint += "; poses of the tool are judged by `trajcli check FILE --job JOB`"
         raise self._file.wrong("no columns are positions of joints, such as q1, q2", hint)
 
-    def _refuse(self, message: str, groups: Mapping[tuple[str, str], ColumnGroup]) -> NoReturn:
-        choices = [f"--columns {self._text(kind, stem)}" for kind, stem in groups]
+    def _refuse(
+        self, message: str, groups: Mapping[tuple[str, str], ColumnGroup], choices: Sequence[str]
+    ) -> NoReturn:
         listed = " or ".join(self._listed(group) for group in groups.values())
-        raise self._file.wrong(f"{message}: {listed}", " or ".join(choices))
+        raise self._file.wrong(f"{message}: {listed}", " or ".join(f"--columns {each}" for each in choices))
 
     def _text(self, kind: str, stem: str) -> str:
         """Return the mapping that chooses the positions of a stem, and what is of the same kind."""
@@ -279,7 +281,8 @@ class _Assignment:
             kind = self._names[next(iter(positions.values()))].kind
             same = {key: group for key, group in groups.items() if key[0] == kind}
             if len(same) > 1:
-                self._refuse_derivative(quantity, same)
+                choices = [f"{quantity}={stem}" for _, stem in same]
+                self._refuse(f"two sets of columns are {quantity}", same, choices)
             if not same:
                 return
             self._chosen[quantity] = next(iter(same.values()))
@@ -294,11 +297,6 @@ class _Assignment:
             raise self._file.wrong(
                 message, f"--columns {quantity}={NONE} leaves these out", self._first_name(found)
             )
-
-    def _refuse_derivative(self, quantity: str, groups: Mapping[tuple[str, str], ColumnGroup]) -> NoReturn:
-        listed = " or ".join(self._listed(group) for group in groups.values())
-        choices = [f"--columns {quantity}={stem}" for _, stem in groups]
-        raise self._file.wrong(f"two sets of columns are {quantity}: {listed}", " or ".join(choices))
 
     def _fitted(self, quantity: str, positions: ColumnGroup) -> bool:
         """Return whether columns can be taken in their order: they are numbered otherwise than positions."""
