@@ -129,10 +129,41 @@ def test_the_bound_of_a_job_is_the_highest_that_is_known_of_each_chain(
     assert whole.best_bound == (pytest.approx(bound), method)
 
 
-def test_where_a_chain_stops_nothing_bounds_the_job() -> None:
-    stopping = FlyBy(10.0, 12.0, 10.0, (), None)
+@pytest.mark.parametrize("chains_of_job", [None, ()])
+def test_where_a_chain_stops_or_none_flies_nothing_bounds_the_job(chains_of_job: tuple[()] | None) -> None:
+    stopping = FlyBy(10.0, 12.0, 10.0, (), chains_of_job)
     assert stopping.second_order is None
     assert stopping.best_bound is None
+
+
+def test_a_job_whose_only_corner_is_its_end_is_not_proven_to_be_fast() -> None:
+    """A move that dawdles, with a zone for all corners: a tenth of the time is enough."""
+    text = {"planner": "quintic", "to": {"joints": [0.9, 1.25]}, "duration": 3}
+    quick = plan_job(loaded({**text, "duration": 0.3}, start={"joints": [0.3, 1.2]}))
+    slow = plan_job(loaded(text, start={"joints": [0.3, 1.2]}))
+    assert quick.trajectory.duration == 0.3
+    assert slow.flyby is not None
+    assert slow.flyby.best_bound is None
+
+
+def test_each_corner_that_is_refused_is_named_at_its_place() -> None:
+    given = loaded(to(1, 1, zone=0.03), HOLD, to(0, 0), to(1, 0, zone=0.03))
+    with pytest.raises(InputError) as caught:
+        flown_corners(given)
+    assert [problem.move for problem in caught.value.problems] == [0, 3]
+    places = [given.document.place(("moves", move, "zone")) for move in (0, 3)]
+    assert [problem.place for problem in caught.value.problems] == places
+    assert "leave `zone` out" in (caught.value.problems[1].hint or "")
+
+
+def test_a_path_has_corners_although_it_names_no_target() -> None:
+    path = {"planner": "path", "radius": 0.01, "segments": [{"line": {"xyz": [0.3, 0.3, 0]}}]}
+    found = flown_corners(loaded(to(0.9, 1.2), path, to(1, 1)))
+    assert sorted([corner.move for corner in found.flown] + [remark.move for remark in found.remarks]) == [
+        0,
+        1,
+        2,
+    ]
 
 
 @pytest.mark.parametrize(

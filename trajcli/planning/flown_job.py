@@ -54,8 +54,8 @@ class FlyBy:
 
     @cached_property
     def second_order(self) -> float | None:
-        """Duration below which no motion through these zones is, s; None where a chain stops."""
-        if self.chains is None:
+        """Duration below which no motion through these zones is, s; None where one stops or none flies."""
+        if not self.chains:
             return None
         return self._with(second_order_bound(chain) for chain in self.chains)
 
@@ -66,7 +66,7 @@ class FlyBy:
         Two straight moves in joint space have a proof that takes some seconds for each chain; others one that
         leaves out most limits of jerk. It is named after the weakest.
         """
-        if self.chains is None or self.second_order is None:
+        if not self.chains or self.second_order is None:
             return None
         close = [close_bound(chain) for chain in self.chains]
         if None in close and not any(close):
