@@ -71,6 +71,34 @@ def test_here_is_where_the_tool_stands_behind_a_target_without_orientation() -> 
     np.testing.assert_allclose(robot.fk(second)[:3, :3], pose[:3, :3], atol=1e-6)
 
 
+def test_here_is_where_a_move_has_ended_that_names_no_target() -> None:
+    """A motion whose last blend is centred on its last point goes on beyond it."""
+    pose = {"xyz": [0.4, 0.1, 0.25], "rpy": [np.pi, 0, 0]}
+    beyond = [value + 0.2 for value in START]
+    blends = {"planner": "blends", "through": [{"joints": beyond, "time": 4}], "blend_durations": 0.5}
+    up = to({"from": "here", "offset": {"xyz": [0, 0, 0.05]}})
+    plan = planned(to(pose), {**blends, "end_blends": "centred"}, up, limits={"acceleration": 20})
+    robot = trajcli.load_robot("ur5e")
+    before, after = (robot.fk(end) for end in ends(plan)[1:])
+    np.testing.assert_allclose(after[:3, 3], before[:3, 3] + 0.05 * before[:3, 2], atol=1e-8)
+    np.testing.assert_allclose(after[:3, :3], before[:3, :3], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "between", [[], [{"planner": "hold", "duration": 1}], [{"signal": "lamp", "value": 1}]]
+)
+def test_angles_are_typed_on_behind_what_moves_nothing(between: list[dict[str, Any]]) -> None:
+    """From 0 to 200 degrees of yaw as they are typed, where the shorter way would be -160."""
+    turn = to({"xyz": [0.4, 0.1, 0.3], "rpy": [np.pi, 0, np.radians(200)]}, "line")
+    pose = {"xyz": [0.4, 0.1, 0.25], "rpy": [np.pi, 0, 0]}
+    plan = planned(to(pose), *between, {**turn, "orientation": "euler"}, limits={"acceleration": 20})
+    begin, end = (
+        plan.trajectory.curve.evaluate(at)
+        for at in (plan.trajectory.spans[-1].start, plan.trajectory.duration)
+    )
+    assert abs(end - begin)[5] == pytest.approx(np.radians(200), abs=0.3)
+
+
 def test_rounds_that_are_the_same_motion_have_numbers_of_their_own() -> None:
     there, back = to({"joints": [0.5, -1.2, 1.4, -0.7, 0.9, 0.2]}), to({"joints": START})
     plan = planned({"repeat": 3, "moves": [there, back]})

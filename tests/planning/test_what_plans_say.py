@@ -26,7 +26,8 @@ def job_of(
     *moves: Mapping[str, Any], start: Mapping[str, Any] | None = None, **others: Any
 ) -> dict[str, Any]:
     """Return a job of an axis that turns and one that slides, in SI."""
-    return {"version": 1, "robot": TWO, "start": start or {"joints": [0, 0]}, "moves": list(moves), **others}
+    first = start or {"joints": [0, 0]}
+    return {"version": 1, "robot": TWO, "start": first, "moves": list(moves), **others}
 
 
 def planned(*moves: Mapping[str, Any], **others: Any) -> Plan:
@@ -182,23 +183,32 @@ def test_what_lacks_is_said_before_what_cannot_be_planned_behind_it() -> None:
     assert [problem.move for problem in caught.value.problems] == [0]
 
 
-@pytest.mark.parametrize("planner", ["cubic", "quintic"])
+@pytest.mark.parametrize("rule", ["natural", "clamped"])
 @pytest.mark.parametrize("joint", [0, 1])
-def test_an_acceleration_at_the_start_is_taken_up_by_each_joint_or_refused(planner: str, joint: int) -> None:
+def test_an_acceleration_at_the_start_is_taken_up_by_each_joint_or_refused(rule: str, joint: int) -> None:
+    """A natural spline has none at its ends; a clamped one that of the first piece is whatever it is."""
     acceleration = [0.0, 0.0]
     acceleration[joint] = 5.0
-    start = {"joints": [0, 0], "acceleration": acceleration}
-    move = {"planner": planner, "to": {"joints": [1, 1]}, "duration": 1}
-    if planner == "quintic":
-        assert planned(SIGNAL, move, start=start).trajectory(0.0, 2) == pytest.approx(acceleration)
-        return
-    with pytest.raises(InputError, match="cubic cannot start with an acceleration") as caught:
+    start = {"joints": [0, 0], "velocity": [0, 0], "acceleration": acceleration}
+    move = {"planner": "spline", "rule": rule, "through": through([[1, 1], [2, 1]], [1, 2])}
+    with pytest.raises(InputError, match="spline cannot start with an acceleration") as caught:
         planned(SIGNAL, move, start=start)
     (problem,) = caught.value.problems
     assert problem.place is not None
-    assert json.dumps(job_of(SIGNAL, move, start=start))[problem.place.column - 1 :].startswith(
-        '{"joints": [0, 0], "acc'
-    )
+    text = json.dumps(job_of(SIGNAL, move, start=start))
+    assert text[problem.place.column - 1 :].startswith('{"joints": [0, 0], "velocity"')
+    quintic = {"planner": "quintic", "to": {"joints": [1, 1]}, "duration": 1}
+    assert planned(SIGNAL, quintic, start=start).trajectory(0.0, 2) == pytest.approx(acceleration)
+
+
+def test_how_a_pose_is_reached_is_said_of_each_round() -> None:
+    """A round begins where the one before it ends, so that its motion is known."""
+    away = {"planner": "quintic", "to": {"xyz": [0.4, 0.1, 0.25], "rpy": [np.pi, 0, 0]}, "duration": 4}
+    home = {"joints": [0, -1.5, 1.5, 0, 1.5, 0]}
+    rounds = {"repeat": 3, "moves": [away, {"planner": "quintic", "to": home, "duration": 4}]}
+    plan = planned(rounds, robot="ur5e", start=home)
+    assert set(plan.poses) == {0, 2, 4}
+    assert plan.poses[2] is plan.poses[4]
 
 
 def test_an_error_says_its_move_and_its_time_in_the_job() -> None:

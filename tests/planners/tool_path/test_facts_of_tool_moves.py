@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from tool_jobs import DOWN, LIMITS, START, TCP, line, plan, planned, poses_of, refusal, rows
 
+from trajcli.kinematics.following.tolerance import Tolerance
+
 HERE = np.array([0.4, 0.1, 0.05])
 UP = {"xyz": rows(HERE + np.array([0.0, 0.0, 0.1]))}
 TURN = {"rpy": [np.pi, 0, 0.8]}
@@ -40,6 +42,7 @@ def test_a_move_knows_what_its_law_may_be_given_to_last_longer(
     law: dict[str, Any], names: list[str], joins: int, given: float | None
 ) -> None:
     planner = only(line(UP, law=law), limits={**LIMITS, "velocity": 60.0}).planner
+    assert all(f": {2 / 3:.12g}`" in text for text, _ in planner.lasting(2 / 3))
     said = dict(planner.lasting(3.0))
     assert [text.split(":")[0].strip("`") for text in said] == names
     for name, (text, longer) in zip(names, said.items(), strict=True):
@@ -52,6 +55,12 @@ def test_a_move_knows_what_its_law_may_be_given_to_last_longer(
     )
     fixed = [name for name in ("duration", "minimum_duration") if name in law]
     assert planner.why_not_flown_by == (f"its law has a `{fixed[0]}`" if fixed else None)
+
+
+def test_a_tolerance_is_one_of_places_and_one_of_angles() -> None:
+    found = only(line(UP, tolerance={"position": 2e-6, "angle": 3e-6})).planner.tolerance.tolerance
+    assert found == Tolerance(2e-6, 3e-6)
+    assert (found.position, found.angle) == (2e-6, 3e-6)
 
 
 @pytest.mark.parametrize(("name", "lasts"), [("duration", 1.5), ("minimum_duration", 1.5), ("speed", 0.0)])
