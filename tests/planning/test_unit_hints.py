@@ -185,3 +185,13 @@ def test_an_error_keeps_what_else_would_help() -> None:
     with pytest.raises(MissingLimitError) as caught:
         plan_job(job_from_text(f"version: 1\nrobot: ur5e\nstart: {{joints: 0}}\n{lacking}", "job.yaml"))
     assert "units" not in (caught.value.problems[0].hint or "")
+
+
+def test_an_angle_of_a_pose_that_looks_like_degrees_is_an_event() -> None:
+    """It is reached as it stands: 180 rad are 5.8 degrees more than 28 turns and a half."""
+    text = "version: 1\nrobot: ur5e\nstart: {joints: [0, -1.5, 1, 0, 1, 0]}\n"
+    for roll, events in (("180", ["units"]), ("180 deg", []), ("3", [])):
+        target = f"{{xyz: [0.4, 0.1, 0.2], rpy: [{roll}, 0, 0]}}"
+        plan = plan_job(job_from_text(f"{text}moves: [{{planner: quintic, to: {target}, duration: 9}}]\n"))
+        assert [event.kind for event in plan.events] == events
+        assert all("angles up to 180 look like degrees" in event.message for event in plan.events)
