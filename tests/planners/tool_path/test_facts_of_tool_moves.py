@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from tool_jobs import DOWN, LIMITS, START, TCP, line, plan, planned, poses_of, refusal, rows
+from tool_jobs import DOWN, LIMITS, START, TCP, arm, line, plan, planned, poses_of, refusal, rows
 
+from trajcli.errors import Amount, PlanningError
 from trajcli.kinematics.following.tolerance import Tolerance
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.solve import solve
+from trajcli.language.poses import Configuration
+from trajcli.planners.tool_path.move import check_arrival
 
 HERE = np.array([0.4, 0.1, 0.05])
 UP = {"xyz": rows(HERE + np.array([0.0, 0.0, 0.1]))}
@@ -161,3 +168,50 @@ def test_every_segment_of_a_path_must_ask_for_what_its_rule_gives(
     segments = [{"line": {**one["line"], **aim}} for one, aim in zip(TWICE, (first, last), strict=True)]
     path = {"planner": "path", "corner": "stop", "segments": segments, "orientation": how}
     assert said in str(refusal("ur5e", START, path))
+
+
+@pytest.mark.parametrize("joint", [1, 4])
+def test_other_joint_values_than_a_target_names_are_refused_where_they_are_furthest_apart(joint: int) -> None:
+    wanted = np.array([0.1, -1.5, 1.5, 0.2, 1.5, 0.3])
+    path: Any = SimpleNamespace(arrival=wanted, configuration=None)
+    other = wanted + 0.9e-5
+    check_arrival(path, other, arm("ur5e"))
+    other[joint] -= 4e-5
+    with pytest.raises(PlanningError) as caught:
+        check_arrival(path, other, arm("ur5e"))
+    (problem,) = caught.value.problems
+    name = arm("ur5e").joint_names[joint]
+    assert problem.joint == problem.amounts["joint"] == name
+    assert problem.amounts["value"] == Amount(other[joint], 0, joint)
+    assert problem.amounts["wanted"] == Amount(wanted[joint], 0, joint)
+
+
+def test_an_arm_arrives_on_the_branch_on_which_it_stands_there() -> None:
+    """All eight answers at the end of a line, each said to be wanted on each branch, and by one word of it."""
+    robot = arm("ur5e")
+    planner = only(line({"xyz": [0.35, 0.2, 0.3], "rpy": [3.0, 0.1, 0.4]})).planner
+    before = forward(robot, np.array([0.1, -1.4, 1.5, -1.7, -1.4, 0.2]))
+    planned_path = planner.path_from(before, robot)
+    target = turned(3.0, 0.1, 0.4)
+    answers = solve(robot, np.block([[target, np.array([[0.35], [0.2], [0.3]])], [np.zeros((1, 3)), 1.0]]))
+    assert answers.valid.sum() == 8
+    choices = ("shoulder", "elbow", "wrist")
+    words = [{choice: getattr(names, choice) for choice in choices} for names in answers.names]
+    assert len({tuple(each.values()) for each in words}) == 8
+    for end, own in [*zip(answers.joints, words, strict=True)][::3]:
+        for other in words:
+            for asked in (
+                other,
+                {"elbow": other["elbow"]},
+                {"shoulder": other["shoulder"], "wrist": other["wrist"]},
+            ):
+                wanted = replace(planned_path, configuration=Configuration(**asked))
+                if all(own[choice] == word for choice, word in asked.items()):
+                    check_arrival(wanted, end, robot)
+                    continue
+                with pytest.raises(PlanningError) as caught:
+                    check_arrival(wanted, end, robot)
+                said = (
+                    f"arrives in the configuration {' '.join(own.values())}, not {' '.join(asked.values())}"
+                )
+                assert said in str(caught.value)

@@ -194,6 +194,15 @@ def test_a_moving_start_is_refused():
     assert error.problems[0].move == 1
 
 
+def test_a_start_with_an_acceleration_alone_is_refused():
+    start = {"joints": [0, -1.5, 1.5, 0, 1.5, 0], "acceleration": [0, 0, 0, 0.25, 0, 0]}
+    error = refusal("ur5e", start, line(law={"shape": "quintic"}))
+    assert "line starts at rest, but the acceleration of wrist_1_joint is 0.25 rad/s^2 at its start" in str(
+        error
+    )
+    assert error.problems[0].joint == "wrist_1_joint"
+
+
 def test_bare_joints_have_no_tool():
     error = refusal({"joints": 6}, {"joints": 0}, line())
     assert error.exit_code == 2
