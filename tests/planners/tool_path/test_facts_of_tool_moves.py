@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tool_jobs import DOWN, LIMITS, START, TCP, arm, line, plan, planned, poses_of, refusal, rows
+from tool_jobs import DOWN, LIMITS, START, TCP, arm, job_text, line, plan, planned, poses_of, refusal, rows
 
 from trajcli.errors import Amount, PlanningError
+from trajcli.job.read import job_from_text
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.language.poses import Configuration
-from trajcli.planners.tool_path.move import check_arrival
+from trajcli.planners.tool_path.move import check_arrival, tool_target
 
 HERE = np.array([0.4, 0.1, 0.05])
 UP = {"xyz": rows(HERE + np.array([0.0, 0.0, 0.1]))}
@@ -215,3 +216,34 @@ def test_an_arm_arrives_on_the_branch_on_which_it_stands_there() -> None:
                     f"arrives in the configuration {' '.join(own.values())}, not {' '.join(asked.values())}"
                 )
                 assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["yaw", "pitch"])
+@pytest.mark.parametrize("angle", [1.0, -0.5, 0.4])
+def test_a_yaw_or_a_pitch_turns_either_way(kind: str, angle: float) -> None:
+    """From a heading of 0.4 and an elevation of -0.4 rad: how far it turns, and where it ends."""
+    before = np.eye(4)
+    before[:3, :3] = turned(0.3, 0.4, 0.4)
+    text = job_text("ur5e", START, line({"xyz": [0.4, 0.3, 0.2], kind: angle, "tool_axis": "x"}))
+    target = getattr(job_from_text(text).job.moves[0], "to")  # noqa: B009 - of a line
+    found = tool_target(target, before, arm("ur5e"))
+    axis = found.pose[:3, 0]
+    heading, rise = np.arctan2(axis[1], axis[0]), np.arcsin(axis[2])
+    assert (heading, rise) == pytest.approx((angle, -0.4) if kind == "yaw" else (0.4, angle), abs=1e-9)
+    assert found.turn == pytest.approx(angle - (0.4 if kind == "yaw" else -0.4), abs=1e-9)
+    assert (found.orientation, found.tool_axis) == (kind, "x")
+    assert found.pose[:3, 3] == pytest.approx([0.4, 0.3, 0.2])
+
+
+def test_a_direction_is_that_of_the_tools_axis_and_bends_no_further() -> None:
+    before = np.eye(4)
+    before[:3, :3] = turned(0.3, 0.4, 0.4)
+    wanted = np.array([1.0, 2.0, -2.0]) / 3
+    text = job_text("ur5e", START, line({"xyz": [0.4, 0.3, 0.2], "direction": [1, 2, -2], "tool_axis": "y"}))
+    target = getattr(job_from_text(text).job.moves[0], "to")  # noqa: B009 - of a line
+    found = tool_target(target, before, arm("ur5e"))
+    assert found.pose[:3, 1] == pytest.approx(wanted)
+    between = np.arccos(before[:3, 1] @ wanted)
+    turn = np.arccos((np.trace(before[:3, :3].T @ found.pose[:3, :3]) - 1) / 2)
+    assert turn == pytest.approx(between), "about the axis that is square to both"
+    assert (found.orientation, found.tool_axis, found.turn) == ("direction", "y", 0.0)
