@@ -127,6 +127,7 @@ def test_typical_bounds_are_geometric_means_of_those_at_nine_places(tcp: dict[st
     sizes = np.prod(np.abs(rows), axis=0) ** (1 / 9)
     assert course.typical_bounds(0.3, 1.7) == pytest.approx(sizes * [-1, 1, -1, 1, -1, 1])
     line = joint_line(np.array([0.1, 0.2]), np.array([1.1, 0.7]), course.robot)
+    assert line.tool.length == 1.0
     assert line.uniform == (not tcp)
     assert line.straight
     assert not course.straight

@@ -11,12 +11,14 @@ import pytest
 from tool_jobs import DOWN, LIMITS, START, TCP, arm, job_text, line, plan, planned, poses_of, refusal, rows
 
 from trajcli.errors import Amount, PlanningError
+from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.following.tolerance import Tolerance
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solve import solve
 from trajcli.language.poses import Configuration
-from trajcli.planners.tool_path.move import check_arrival, tool_target
+from trajcli.language.targets import Target
+from trajcli.planners.tool_path.move import ToolTarget, check_arrival, orientation_along, tool_target
 
 HERE = np.array([0.4, 0.1, 0.05])
 UP = {"xyz": rows(HERE + np.array([0.0, 0.0, 0.1]))}
@@ -218,14 +220,87 @@ def test_an_arm_arrives_on_the_branch_on_which_it_stands_there() -> None:
                 assert said in str(caught.value)
 
 
+def first_move(robot: str, start: dict[str, Any], move: dict[str, Any]) -> Any:
+    """Return the first move of a job that is not planned."""
+    return job_from_text(job_text(robot, start, move)).job.moves[0]
+
+
+def target_of(to: dict[str, Any]) -> Target:
+    found: Target = first_move("ur5e", START, line(to)).to
+    return found
+
+
+@pytest.mark.parametrize(
+    ("beside", "heading"), [(0.5, 1.5), (0.5, np.pi / 2), (0.5, -np.pi / 2), (0.005, 0.0), (1e-5, 3.0)]
+)
+def test_an_axis_that_is_nearly_upright_has_a_heading(beside: float, heading: float) -> None:
+    before = np.eye(4)
+    before[:3, :3] = turned(
+        0.0, beside - np.pi / 2, heading
+    )  # x points up, but for the part that it is beside
+    found = tool_target(
+        target_of({"xyz": [0.4, 0.3, 0.2], "yaw": 1.0, "tool_axis": "x"}), before, arm("ur5e")
+    )
+    assert np.arctan2(*found.pose[1::-1, 0]) == pytest.approx(1.0, abs=1e-9)
+    assert np.cos(found.turn - (1.0 - heading)) == pytest.approx(1.0, abs=1e-9)
+
+
+def about_z(angle: float, typed: float | None = None) -> ToolTarget:
+    """Return a target turned about z, whose angles may be typed otherwise."""
+    pose = np.eye(4)
+    pose[:3, :3] = turned(0, 0, angle)
+    angles = np.array([0, 0, angle if typed is None else typed])
+    return ToolTarget(pose, (True, True, True), "all", typed=(angles, "XYZ", "fixed"))
+
+
+def test_a_fixed_orientation_takes_rounding_alone() -> None:
+    fixed = orientation_along("fixed", np.eye(3), [about_z(1e-12)], None, SegmentProgress.even(2.0))
+    assert fixed.length == 2.0
+    with pytest.raises(PlanningError, match="orientation: fixed keeps the orientation"):
+        orientation_along("fixed", np.eye(3), [about_z(1e-5)], None, SegmentProgress.even(2.0))
+
+
+@pytest.mark.parametrize(
+    ("start", "angles", "middle"),
+    [
+        (0, (170, 400), (85, 285)),
+        (-100, (170, 400), (215, 285)),
+        (0, (300, 400), (150, 350)),
+        (0, (-300, 10), (-150, -145)),
+    ],
+)
+def test_angles_that_are_typed_on_begin_within_half_a_turn_or_nearest_to_the_first(
+    start: int, angles: tuple[int, int], middle: tuple[int, int]
+) -> None:
+    """Within half a turn where the first one is beyond it."""
+    targets = [about_z(np.radians(angle)) for angle in angles]
+    progress = SegmentProgress(np.array([0.0, 1.0, 2.0]), np.zeros(1))
+    curve = orientation_along("euler", turned(0, 0, np.radians(start)), targets, None, progress)
+    for s, angle in zip((0.5, 1.5), middle, strict=True):
+        found = curve.evaluate(np.array([s]))[0][0]
+        assert found == pytest.approx(turned(0, 0, np.radians(angle)), abs=1e-9)
+
+
+@pytest.mark.parametrize(("how", "fixed"), [("tangent", "all"), ("axis_angle", "none")])
+def test_an_orientation_that_follows_from_the_path_is_fixed_on_an_arm_with_few_joints(
+    how: str, fixed: str
+) -> None:
+    bend = {"planner": "arc", "center": [0.2, 0.3, 0], "axis": "z", "angle": 0.4, "orientation": how}
+    start = {"joints": [0.3, 0.7, 0.4]}
+    move = first_move("planar3r", start, bend)
+    assert (
+        move.path_from(forward(arm("planar3r"), np.array(start["joints"])), arm("planar3r")).path.orientation
+        == fixed
+    )
+
+
 @pytest.mark.parametrize("kind", ["yaw", "pitch"])
 @pytest.mark.parametrize("angle", [1.0, -0.5, 0.4])
 def test_a_yaw_or_a_pitch_turns_either_way(kind: str, angle: float) -> None:
     """From a heading of 0.4 and an elevation of -0.4 rad: how far it turns, and where it ends."""
     before = np.eye(4)
     before[:3, :3] = turned(0.3, 0.4, 0.4)
-    text = job_text("ur5e", START, line({"xyz": [0.4, 0.3, 0.2], kind: angle, "tool_axis": "x"}))
-    target = getattr(job_from_text(text).job.moves[0], "to")  # noqa: B009 - of a line
+    target = target_of({"xyz": [0.4, 0.3, 0.2], kind: angle, "tool_axis": "x"})
     found = tool_target(target, before, arm("ur5e"))
     axis = found.pose[:3, 0]
     heading, rise = np.arctan2(axis[1], axis[0]), np.arcsin(axis[2])
@@ -239,8 +314,7 @@ def test_a_direction_is_that_of_the_tools_axis_and_bends_no_further() -> None:
     before = np.eye(4)
     before[:3, :3] = turned(0.3, 0.4, 0.4)
     wanted = np.array([1.0, 2.0, -2.0]) / 3
-    text = job_text("ur5e", START, line({"xyz": [0.4, 0.3, 0.2], "direction": [1, 2, -2], "tool_axis": "y"}))
-    target = getattr(job_from_text(text).job.moves[0], "to")  # noqa: B009 - of a line
+    target = target_of({"xyz": [0.4, 0.3, 0.2], "direction": [1, 2, -2], "tool_axis": "y"})
     found = tool_target(target, before, arm("ur5e"))
     assert found.pose[:3, 1] == pytest.approx(wanted)
     between = np.arccos(before[:3, 1] @ wanted)
