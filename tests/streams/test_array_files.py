@@ -53,6 +53,33 @@ def test_signals_keep_their_names(ending: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(found["signal.air"], ROWS[:, 5])
 
 
+@pytest.mark.parametrize("write", [write_npy_blocks, write_npz_blocks])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_number_that_is_not_finite_is_refused_with_its_row(
+    write: Callable[..., Iterable[object]], value: float
+) -> None:
+    wrong = ROWS[20:].copy()
+    wrong[1, 2] = value
+    with pytest.raises(TrajcliError, match=f"q2 is {value} in row 21;"):
+        list(write(iter([ROWS[:10], ROWS[10:20], wrong]), COLUMNS, io.BytesIO()))
+
+
+@pytest.mark.parametrize("write", [write_npy_blocks, write_npz_blocks])
+def test_columns_of_a_group_that_stand_apart_are_refused(write: Callable[..., Iterable[object]]) -> None:
+    apart = [COLUMNS[k] for k in (0, 1, 3, 4, 2)]
+    with pytest.raises(TrajcliError, match="the columns q stand apart"):
+        list(write(iter([ROWS[:, :5]]), apart, io.BytesIO()))
+
+
+def test_an_array_begins_where_the_stream_stands_and_leaves_it_behind_its_end() -> None:
+    alone, out = io.BytesIO(), io.BytesIO()
+    list(write_npy_blocks(iter(BLOCKS), COLUMNS, alone))
+    out.write(b"before")
+    list(write_npy_blocks(iter(BLOCKS), COLUMNS, out))
+    out.write(b"behind")
+    assert out.getvalue() == b"before" + alone.getvalue() + b"behind"
+
+
 def test_a_pipe_gets_the_same_bytes(tmp_path: Path) -> None:
     class Pipe(io.BytesIO):
         def seekable(self) -> bool:
