@@ -63,6 +63,39 @@ def test_numbers_of_a_file_without_units_are_in_those_of_the_job_by_the_kind_of_
     assert "(3 rows, 2 joints, 1.5 s)" in repr(motion)
 
 
+def test_joints_are_in_the_order_of_the_arm_and_its_limits_count(tmp_path: Path) -> None:
+    """A file that names the slide first, of 12 mm/s at most; and one of an arm of the catalogue."""
+    rows = tmp_path / "rows.csv"
+    rows.write_text("time,slide_pos,turn_pos\n" + "".join(f"{k},{6 * k:.6f},{k:.6f}\n" for k in range(5)))
+    slow = job_file(tmp_path, limits={"velocity": [100, 3]})
+    motion = trajcli.retime(rows, job=slow)
+    assert motion.q == pytest.approx(np.outer(np.arange(5), [np.radians(1), 6e-3]))
+    assert motion.duration == pytest.approx(4 * 2, rel=1e-5)
+    arm = tmp_path / "arm.csv"
+    arm.write_text("t,q1,q2,q3,q4,q5,q6\n" + "".join(f"{k},{4 * k:.6f},0,0,0,0,0\n" for k in range(2)))
+    fastest = trajcli.load_robot("ur5e").limits.velocity[0, 1]
+    assert trajcli.retime(arm, robot="ur5e").duration == pytest.approx(4 / fastest, rel=1e-5)
+
+
+def test_a_file_that_names_no_moves_has_those_of_the_job_at_its_times(tmp_path: Path) -> None:
+    output = {"columns": ["t", "q", "qd", "qdd"], "rate": 100}
+    trajcli.plan(job_file(tmp_path, output=output)).save(tmp_path / "rows.csv")
+    limited = job_file(tmp_path, name="limited", limits={"velocity": 60})
+    motion = trajcli.retime(tmp_path / "rows.csv", job=limited, per_move=True)
+    assert [stretch.factor for stretch in motion.stretches] == pytest.approx([1, 75 / 60], rel=1e-6)
+
+
+def test_numbers_that_nobody_gives_a_unit_are_kept_on_another_grid(tmp_path: Path) -> None:
+    rows = tmp_path / "rows.csv"
+    rows.write_text("time,turn_pos\n" + "".join(f"{k},{2 * k}\n" for k in range(4)))
+    motion = trajcli.resample(rows, 2, output=tmp_path / "after.csv")
+    assert motion.q[:, 0] == pytest.approx(np.arange(7.0), abs=1e-9)
+    assert motion.t == pytest.approx(np.arange(7) / 2)
+    for rate in (0, -1, float("nan"), "2"):
+        with pytest.raises(trajcli.InputError, match="rate: expected rows per second above 0"):
+            trajcli.resample(rows, rate)  # type: ignore[arg-type]
+
+
 def test_what_is_written_is_what_is_judged(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """The motion of the file that is written is read back: its decimals are those that keep the limits."""
     trajcli.plan(job_file(tmp_path, output={"rate": 50})).save(tmp_path / "rows.csv")
