@@ -20,6 +20,8 @@ JOINED = [
     ("0 --qdd 1 -2 --json", "0 --qdd=1,-2 --json"),
     ("--near nan -inf 3 -", "--near=nan,-inf,3 -"),
     ("{a} --point -2 1 1 {b}", "{a} --point=-2,1,1 {b}"),
+    ("--near 1 infinite.csv", "--near=1 infinite.csv"),
+    ("--near NaN -Inf +INFINITY .NaN nano", "--near=NaN,-Inf,+INFINITY,.NaN nano"),
     ("{a} --s 0 0.5 1 --json", "{a} --s=0,0.5,1 --json"),
 ]
 
@@ -39,6 +41,8 @@ SORTED = [
     ("--json 3 --robot", "--json --robot"),
     ("3 --robot -- 4", "--robot"),
     ("0 -inf --json", "--json -- 0 -inf"),
+    ("0 -Inf -.NAN --json", "--json -- 0 -Inf -.NAN"),
+    ("0 -infer --json", "-infer --json -- 0"),
 ]
 
 
@@ -57,3 +61,20 @@ def test_a_robot_where_numbers_stand_is_told_its_option(
     for words in (("fk", "-r", "ur5e", robot), ("fk", "--robot=ur5e", robot), ("pose", robot)):
         other = call(capfd, *words)
         assert (other.code, "The robot is an option" in other.err) == (2, False), words
+
+
+def test_an_option_without_its_value_says_that_it_lacks_one(capfd: pytest.CaptureFixture[str]) -> None:
+    code, _, err = call(capfd, "fk", "0", "--robot")
+    assert (code, "requires an argument" in err, "Traceback" in err) == (2, True, False)
+    code, _, err = call(capfd, "robots", "--joints", "0")
+    assert (code, "greater than or equal to 1" in err) == (2, True)
+
+
+@pytest.mark.parametrize(("beyond", "code"), [(7e-7, 0), (1.5e-6, 3)])
+def test_an_answer_misses_by_a_millionth_at_most_where_nobody_says_more(
+    beyond: float, code: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Of an arm of 0.3 m and 0.2 m, stretched."""
+    pose = f"{{xyz: [{0.5 + beyond:.9f}, 0, 0]}}"
+    assert call(capfd, "ik", "--robot", "planar2r", "--pose", pose, "--si").code == code
+    assert call(capfd, "ik", "--robot", "planar2r", "--pose", pose, "--si", "--tolerance", "1e-5").code == 0
