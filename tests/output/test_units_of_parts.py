@@ -7,6 +7,7 @@ import re
 from typing import Any, get_args
 
 import pytest
+from pydantic import TypeAdapter
 
 from trajcli.job import explanation, report, report_parts
 from trajcli.job.report_parts import MeasuredIn, ReportPart, in_units
@@ -126,3 +127,90 @@ def test_a_unit_that_nobody_gives_is_that_of_si(unit: str) -> None:
 def test_what_is_not_there_is_not_converted() -> None:
     peak = report.PeakReport.model_construct(low=1.0, high=1.0, limit=(None, 2.0), used=None, unit="m/s")
     assert in_units(peak, Units("deg", "mm")).limit == (None, 2000.0)
+
+
+STATED = {  # what a part says where nobody says otherwise
+    "Report.version": 1,
+    "ToolReport.method": "sampled",
+    "AtLimitReport.method": "exact",
+    "ReferenceReport.through_points": False,
+    "PathReferenceReport.solver": "toppra",
+    "PathReferenceReport.deviation": 0.0,
+    "EffortReport.method": "bounded",
+    "PayloadReport.mass_unit": "kg",
+    "PayloadReport.inertia_unit": "kg m^2",
+    "EffortsReport.gravity_unit": "m/s^2",
+    "UnitsReport.time": "s",
+    "LineSegmentReport.kind": "line",
+    "RotationSegmentReport.kind": "rotation",
+    "ScrewSegmentReport.kind": "screw",
+}
+JOINTS = "position velocity acceleration jerk"
+TOOL = "speed acceleration jerk angular_speed angular_acceleration angular_jerk"
+WORDS = {  # of a field all words that it may hold
+    "Report.verdict": "verified violated",
+    "FindingReport.method": "exact bounded sampled",
+    "RowsReport.interpolation": "linear cubic quintic",
+    "RowsReport.verdict": "satisfied exceeded",
+    "FastestReport.method": "bounded heuristic",
+    "ToolReport.method": "bounded sampled",
+    "ToolReport.ruled_by": "translation rotation",
+    "ToolReport.unit": "m rad mm deg",
+    "BindingReport.quantity": f"{JOINTS} velocity_by_position effort {TOOL}",
+    "AtLimitReport.quantity": f"{JOINTS} velocity_by_position",
+    "AtLimitReport.method": "exact phases",
+    "UncheckedReport.quantity": f"{JOINTS} effort",
+    "ToolPeakReport.quantity": TOOL,
+    "LimitUseReport.quantity": "velocity acceleration",
+    "ConsumerFinding.severity": "error warning",
+    "ConsumerFinding.method": "exact differences",
+    "ZoneReport.of": "position orientation joints",
+    "BoundReport.method": "proven second_order",
+    "ChoiceReport.by": "configuration nearest",
+    "ArcSegmentReport.kind": "arc helix",
+    "WeaveReport.shape": "sine triangle trapezoid",
+}
+
+
+def test_what_a_part_says_where_nobody_says_otherwise() -> None:
+    for each, value in STATED.items():
+        part, _, field = each.partition(".")
+        assert PARTS[part].model_fields[field].default == value, each
+
+
+def test_every_word_of_a_report_can_stand_in_its_field() -> None:
+    for each, words in WORDS.items():
+        part, _, field = each.partition(".")
+        kind = TypeAdapter(PARTS[part].model_fields[field].annotation)
+        assert [kind.validate_python(word) for word in words.split()] == words.split(), each
+        with pytest.raises(ValueError, match="Input should be"):
+            kind.validate_python("nothing of it")
+
+
+def test_a_number_that_is_zero_or_a_list_that_is_empty_is_no_part_that_is_missing() -> None:
+    """Where a part leaves out what there is not, a program still finds all else."""
+    chosen = {
+        "by": "nearest",
+        "configuration": {},
+        "near": [],
+        "units": [],
+        "candidates": 0,
+        "within_limits": 0,
+    }
+    given: dict[str, Any] = {
+        "joints": [],
+        "units": [],
+        "branch": {},
+        "method": "",
+        "singular": False,
+        "rank": {},
+    }
+    pose = explanation.PoseReport(**given, chosen=chosen)  # type: ignore[arg-type]
+    assert pose.model_dump() == {**given, "chosen": chosen}
+    free = explanation.PoseReport(**given, chosen=chosen, free_direction=[0.0])  # type: ignore[arg-type]
+    assert free.model_dump()["free_direction"] == [0.0]
+    screw: dict[str, Any] = {"axis": [0.0, 0.0, 1.0], "angle": 0.0, "advance": 0.0}
+    units = {"kind": "screw", "unit": "m", "angle_unit": "rad"}
+    assert explanation.ScrewSegmentReport(**screw).model_dump() == {**screw, **units}
+    path: dict[str, Any] = {"length": 0.0, "unit": "m", "segments": [], "corners": [], "law": []}
+    assert explanation.PathReport(**path).model_dump() == path
