@@ -40,6 +40,17 @@ def test_rest_is_without_velocity_and_acceleration() -> None:
         assert State(np.ones(1), np.array([velocity]), np.array([acceleration])).at_rest == rests
 
 
+def test_a_joint_that_moves_beside_others_that_do_not_is_no_rest_and_values_are_frozen() -> None:
+    still, moving = np.zeros(3), np.array([0.0, -0.1, 0.0])
+    for velocity, acceleration in ((moving, still), (still, moving), (moving, moving)):
+        assert not State(still, velocity, acceleration).at_rest
+    state, points = State(still, still, still), ViaPoints(still, np.ones((3, 1)), np.ones((3, 1)))
+    arrays = (state.position, state.velocity, state.acceleration, points.times, points.points, points.missed)
+    for array in arrays:
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
 def test_states_are_told_apart_by_each_of_their_derivatives() -> None:
     one, other = np.array([1.0]), np.array([2.0])
     states = [State(one, one, one), State(other, one, one), State(one, other, one), State(one, one, other)]
@@ -63,6 +74,7 @@ def test_calls_count_from_the_time_of_the_start_and_end_within_rounding(start: f
     assert positions.shape == (2, 2, 1)
     np.testing.assert_allclose(positions[..., 0], [[0, 0.25], [1, 9]], atol=1e-9)
     assert trajectory(start + 1.0 - 5e-13, 1) == pytest.approx(3.0)  # at a break the later piece
+    assert [trajectory(start + 0.5, order).tolist() for order in (2, 3, 4)] == [[2.0], [0.0], [0.0]]
     assert trajectory(start - 5e-10).tolist() == [0.0]
     assert trajectory(start + 3 + 5e-10) == pytest.approx(9.0)
     for late in (-2e-9, 3 + 2e-9, np.nan):
