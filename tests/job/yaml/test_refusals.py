@@ -50,6 +50,7 @@ REFUSALS = [  # text, line, column, what is underlined, message, hint
     ("{{a: 1}: 1}\n", 1, 2, "{a: 1}", "a mapping cannot be a key", None),
     ("{a: 1, : 2}\n", 1, 8, ":", "a key is missing", None),
     (": 1\n", 1, 1, ":", "a key is missing", None),
+    ("a: 1\na: 2\n", 2, 1, "a", "the key 'a' already stands in line 1", "keep one of them"),
     ("a: [1, .nan]\n", 1, 8, ".nan", "expected a finite number, got .nan", None),
     ("a: -.inf\n", 1, 4, "-.inf", "expected a finite number, got -.inf", "null"),
     ("a: 1e999\n", 1, 4, "1e999", "1e999 is too large", None),
@@ -266,6 +267,23 @@ def test_a_whole_that_is_no_mapping_is_said_shortly_and_by_its_file() -> None:
 def test_a_number_that_is_too_long_to_show_says_how_long_it_is() -> None:
     (problem,) = refused(f"a: {'9' * 400}\n")
     assert problem.message.startswith(f"{'9' * 40}... (400 characters) is too large")
+
+
+@pytest.mark.usefixtures("_parser")
+def test_tabs_and_spaces_stand_between_tokens_in_any_number() -> None:
+    assert parse_document("z:\t \t1\t \t# tab\ny: [1,\t\t2\t]\n", "f").plain() == {"z": 1, "y": [1, 2]}
+
+
+def test_a_truth_as_a_key_is_put_into_quotes_and_a_quoted_colon_is_none_of_its_own() -> None:
+    assert [problem.hint for problem in refused("true: 1\n")] == ['write "true"']
+    assert parse_document('{"a:b"}', "f").plain() == {"a:b": None}
+    assert [problem.message for problem in refused("{? : 2}\n")] == ["a key is missing before the colon"]
+
+
+@pytest.mark.usefixtures("_parser")
+def test_of_a_text_of_several_lines_the_first_is_underlined() -> None:
+    here = parse_document('a: "xx y\n  z"\n', "f").place(("a",))
+    assert here.source[here.column - 1 : here.column - 1 + here.length] == '"xx y'
 
 
 def test_a_colon_in_a_key_is_part_of_it_where_a_space_follows_the_last() -> None:
