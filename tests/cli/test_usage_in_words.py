@@ -126,7 +126,10 @@ def test_a_limit_as_an_option_is_a_value_to_set(option: str, key: str, capfd: Ca
     ("words", "meant"),
     [
         (("check", "rows.csv", "-j", JOB), "say --job, or --json"),
-        (("plan", JOB, "--json"), "rows are JSON with --format jsonl"),
+        (
+            ("plan", JOB, "--json"),
+            "rows are JSON with --format jsonl, the report of `plan` with --report FILE, and `batch` prints nothing else",
+        ),
     ],
 )
 def test_an_option_of_another_command_is_explained(
