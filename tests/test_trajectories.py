@@ -133,7 +133,6 @@ def test_names_of_a_move(ends: str, origin: str, goal: str) -> None:
     assert (span.origin, span.goal, span.duration) == (origin, goal, 1.0)
     assert span.title == (f"{ends} (line, slot 2 of 3)" if ends else "line, slot 2 of 3")
     assert replace(span, label="weld").title == "weld (line, slot 2 of 3)"
-    assert replace(span, label="weld").words == "line, weld, slot 2 of 3"
     assert move_title("", None, "line", "") == "line"
 
 

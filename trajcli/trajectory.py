@@ -180,11 +180,6 @@ class Span:
         return robot if self.payload is robot.payload else replace(robot, payload=self.payload)
 
     @property
-    def words(self) -> str:
-        """What it is where there is little room: its planner, label and round."""
-        return ", ".join(word for word in (self.planner, self.label, self.round) if word)
-
-    @property
     def title(self) -> str:
         """What it is, such as "pick -> above_place (jerk_limited)"; without a name only its planner."""
         return move_title(self.ends, self.label, self.planner, self.round)

@@ -9,7 +9,6 @@ from trajcli.geometry.rotation import (
     canonical,
     check_quaternion,
     matrix_from_quaternion,
-    multiply,
     quaternion_from_matrix,
     without_jumps,
 )
@@ -43,17 +42,6 @@ def test_the_first_component_that_counts_is_positive():
     np.testing.assert_array_equal(canonical(given), expected)
     assert not np.signbit(canonical(given)[1:, 0]).any()
     assert (quaternion_from_matrix(RANDOM.as_matrix())[:, 0] >= 0).all()
-
-
-def test_products_are_products_of_the_matrices():
-    left, right = WXYZ[:250], WXYZ[250:]
-    matrices = RANDOM.as_matrix()
-    np.testing.assert_allclose(
-        matrix_from_quaternion(multiply(left, right)), matrices[:250] @ matrices[250:], rtol=0, atol=2e-15
-    )
-    np.testing.assert_allclose(
-        multiply(WXYZ, WXYZ * [1, -1, -1, -1]), np.tile([1, 0, 0, 0], (500, 1)), rtol=0, atol=1e-15
-    )
 
 
 def test_what_is_no_unit_quaternion_is_refused():

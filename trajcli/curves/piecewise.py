@@ -139,10 +139,6 @@ class PiecewisePolynomial:
         """Length of each piece, shape (pieces,)."""
         return np.diff(self.breaks)
 
-    def derivative(self, order: int = 1) -> PiecewisePolynomial:
-        """Return the curve's derivative; of an order above the degree it is zero, of degree 0."""
-        return PiecewisePolynomial(self.breaks, derivative_coefficients(self.coefficients, order))
-
     def piece_ends(self, order: int = 0, pieces: slice = ALL) -> tuple[Array, Array]:
         """Return the derivative of pieces at their own two ends, as two arrays of shape (pieces, n).
 

@@ -155,20 +155,6 @@ def canonical(quaternion: Array) -> Array:
     return result
 
 
-def multiply(left: Array, right: Array) -> Array:
-    """Return the Hamilton products (*batch, 4): first `right`, then `left`, about fixed axes."""
-    a, b = np.moveaxis(left, -1, 0), np.moveaxis(right, -1, 0)
-    return np.stack(
-        [
-            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-        ],
-        axis=-1,
-    )
-
-
 def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
     """Return the rotation matrices (*batch, 3, 3); the length of the quaternion is divided out.
 
