@@ -23,6 +23,12 @@ NANOSECOND = 1e-9  # s: the last decimal of a time in a file: rows closer than t
 _END = 1e-6  # of a period: an end this close to a grid time replaces that row
 
 
+def outside_trajectory(time: float, start: float, end: float) -> InputError:
+    """Return the error of a time that is not between the start and the end of a trajectory, s."""
+    hint = f"it lasts from {start:.12g} s to {end:.12g} s"
+    return InputError(f"the time {time:.12g} s lies outside the trajectory", hint=hint)
+
+
 @comparable
 class UniformGrid:
     """Rows at `start_time` + k / rate, and one exactly at the end.
@@ -97,10 +103,7 @@ class ListedGrid:
             raise InputError("the list of times is empty", hint="give at least one time, or a rate")
         inside = (times >= low - NANOSECOND) & (times <= high + NANOSECOND)
         if not inside.all():
-            raise InputError(
-                f"the time {times[~inside][0]:.12g} s lies outside the trajectory",
-                hint=f"it lasts from {low:.12g} s to {high:.12g} s",
-            )
+            raise outside_trajectory(times[~inside][0], low, high)
         times = read_only(np.clip(times, low, high))
         close = np.flatnonzero(np.diff(times) <= NANOSECOND)
         if close.size:

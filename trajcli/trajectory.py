@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, numeric, read_only, real_number
 from trajcli.errors import InputError
 from trajcli.frozen import comparable, frozen
-from trajcli.grids import AT_BREAK, NANOSECOND, UniformGrid, onto_breaks
+from trajcli.grids import AT_BREAK, NANOSECOND, UniformGrid, onto_breaks, outside_trajectory
 from trajcli.kinematics.robot import JointType, MountedTool, Payload, Robot
 
 if TYPE_CHECKING:
@@ -315,11 +315,8 @@ class Trajectory:
         local = np.atleast_1d(times).reshape(-1) - self.start_time
         outside = ~((local >= -_ROUNDING) & (local <= self.duration + _ROUNDING))
         if outside.any():
-            end = self.start_time + self.duration
-            raise InputError(
-                f"the time {times.reshape(-1)[outside][0]:.12g} s lies outside the trajectory",
-                hint=f"it lasts from {self.start_time:.12g} s to {end:.12g} s",
-            )
+            start = self.start_time
+            raise outside_trajectory(times.reshape(-1)[outside][0], start, start + self.duration)
         local = onto_breaks(np.clip(local, 0.0, self.duration), self.curve.breaks)
         return self.curve.evaluate(local, order).reshape(*times.shape, self.curve.dimension)
 

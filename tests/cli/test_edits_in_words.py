@@ -100,7 +100,7 @@ def test_every_jump_is_said_and_nothing_written(
     words: tuple[str, ...], capfd: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     jumps = [Problem("the position of j1 jumps"), Problem("the velocity of j2 jumps")]
-    monkeypatch.setattr("trajcli.cli.edit.new_jumps", lambda *_: jumps)
+    monkeypatch.setattr("trajcli.editing.requirements.new_jumps", lambda *_: jumps)
     outcome = call(capfd, *words, "-o", "out.csv")
     assert outcome.code == 1
     assert outcome.err == "error: the position of j1 jumps\nerror: the velocity of j2 jumps\n"

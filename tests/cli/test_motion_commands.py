@@ -57,7 +57,9 @@ def test_rows_go_to_standard_output_and_words_to_the_other(words: tuple[str, ...
 
 
 def test_resampled_rows_that_jump_are_not_written(capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trajcli.cli.edit.new_jumps", lambda *_: [Problem("the position of j1 jumps")])
+    monkeypatch.setattr(
+        "trajcli.editing.requirements.new_jumps", lambda *_: [Problem("the position of j1 jumps")]
+    )
     code, _, err = call(capfd, "resample", "rows.csv", "--rate", "20", "-o", "out.csv")
     assert code == 1
     assert "the position of j1 jumps" in err

@@ -8,7 +8,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from trajcli.cli.numbers import number
-from trajcli.cli.outcome import error_as_json, print_json, print_lines, print_remark, print_text, report_error
+from trajcli.cli.outcome import (
+    error_as_json,
+    print_json,
+    print_lines,
+    print_remark,
+    print_text,
+    refuse_two_inputs,
+    report_error,
+)
 from trajcli.cli.terminal import shown_table
 from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, at_least
 from trajcli.findings import Finding
@@ -79,8 +87,7 @@ def run_check(options: CheckCommand) -> int:
 def _form(
     options: CheckCommand, files: Sequence[str]
 ) -> Literal["table", "json", "junit", "sarif", "github"]:
-    if files.count("-") > 1:
-        raise InputError("standard input can be read once")
+    refuse_two_inputs(files)
     if options.as_json and options.form not in ("table", "json"):
         raise InputError(f"--json and --format {options.form} exclude each other", hint="leave one out")
     return "json" if options.as_json else options.form

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.cli.outcome import print_remark
+from trajcli.cli.outcome import print_remark, refuse_two_inputs
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.operations import cut, join, resample, reverse
-from trajcli.editing.requirements import kept_limits, new_jumps, worst_deviation
+from trajcli.editing.requirements import kept_limits, refuse_new_jumps, worst_deviation
 from trajcli.editing.writing import as_read, plain_columns, write_motion
-from trajcli.errors import InputError, VerificationError
+from trajcli.errors import InputError
 from trajcli.streams.formats import format_of
 from trajcli.streams.whole_file import refuse_overwriting
 from trajcli.units import Units
@@ -67,7 +67,7 @@ def run_resample(options: ResampleCommand) -> int:
     motion = _read(options.file, options)
     hertz = _hertz(options.rate)
     found = resample(motion, hertz)
-    _check_continuity(motion, found)
+    refuse_new_jumps(motion, found)
     joint, size = worst_deviation(motion, found.as_written())
     _write(found, options)
     rows = f"{found.rows.t.size} row{'s' * (found.rows.t.size != 1)}"
@@ -85,13 +85,13 @@ def run_concat(options: ConcatCommand) -> int:
     sources = options.files
     if len(sources) < 2:
         raise InputError("concat joins two files at least, and there is one")
-    _refuse_two_inputs(sources)
+    refuse_two_inputs(sources)
     _check_output(sources, options)
     motions = [_read(source, options) for source in sources]
     found = motions[0]
     for motion in motions[1:]:
         found = join(found, motion)
-    _check_continuity(motions[0], found, *motions[1:])
+    refuse_new_jumps(motions[0], found, *motions[1:])
     _write(found, options)
     _say(options, f"{' + '.join(motion.rows.source for motion in motions)}: joined, {_extent(found)}")
     return 0
@@ -106,7 +106,7 @@ def run_convert(options: ConvertCommand) -> int:
     from trajcli.queries.arm import files_of_arm
 
     arm = [] if options.robot is None else [options.robot]
-    _refuse_two_inputs([options.file, *arm])
+    refuse_two_inputs([options.file, *arm])
     _check_output([options.file], options, (file for name in arm for file in files_of_arm(name)))
     motion = _read(options.file, options, options.robot, si=options.si)
     if options.si:
@@ -128,7 +128,7 @@ def run_retime(options: RetimeCommand) -> int:
     from trajcli.streams.reading import refuse_job
 
     arm = [name for name in (options.job, options.robot) if name is not None]
-    _refuse_two_inputs([options.file, *arm])
+    refuse_two_inputs([options.file, *arm])
     _check_output([options.file], options, (file for name in arm for file in files_of_arm(name)))
     if not arm:
         refuse_job(ByteSource(options.file))
@@ -148,7 +148,7 @@ def run_retime(options: RetimeCommand) -> int:
     found, stretches = retime(
         motion, kept, fastest=options.fastest, per_move=options.per_move, as_read=reader
     )
-    _check_continuity(motion, found)
+    refuse_new_jumps(motion, found)
     _write(found, options)
     for stretch in stretches:
         _say(options, f"{motion.rows.source}: {_stretch(stretch, limits.say)}")
@@ -177,7 +177,7 @@ def _edited(
     _check_output([source], options)
     motion = _read(source, options)
     found = operation(motion)
-    _check_continuity(motion, found)
+    refuse_new_jumps(motion, found)
     _write(found, options)
     _say(options, f"{motion.rows.source}: {what}, {_extent(found)}")
     return 0
@@ -201,22 +201,10 @@ def _read(source: str, options: EditCommand, robot: str | None = None, *, si: bo
     )
 
 
-def _refuse_two_inputs(sources: Sequence[str]) -> None:
-    if sources.count("-") > 1:
-        raise InputError("standard input can be read once")
-
-
 def _write(motion: EditedMotion, options: EditCommand) -> None:
     notes = write_motion(motion, options.output, options.form)
     for note in dict.fromkeys([*motion.notes, *notes]):
         _say(options, f"  {note}")
-
-
-def _check_continuity(before: EditedMotion, after: EditedMotion, *more: EditedMotion) -> None:
-    """Refuse a motion that jumps where those that it is made of do not."""
-    problems = new_jumps(before, after, *more)
-    if problems:
-        raise VerificationError(*problems)
 
 
 def _check_output(sources: Sequence[str], options: EditCommand, more: Iterable[tuple[str, str]] = ()) -> None:

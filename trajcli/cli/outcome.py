@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, TextIO
 
 from trajcli.cli.progress import columns, is_terminal
-from trajcli.errors import LONGEST_LINE, Problem, TrajcliError
+from trajcli.errors import LONGEST_LINE, InputError, Problem, TrajcliError
 
 ErrorForm = Literal["text", "json", "github", "junit", "sarif"]
 
@@ -46,6 +46,16 @@ def _outcome(run: Callable[[Any], int], options: Any, form: ErrorForm) -> int:  
         return FILE_FAILED  # of standard error: nobody can be told
     except Exception as error:  # noqa: BLE001
         return report_bug(error, form)
+
+
+def refuse_two_inputs(sources: Sequence[str]) -> None:
+    """Refuse standard input, which is named "-", in two places.
+
+    Raises:
+        InputError: When it is.
+    """
+    if sources.count("-") > 1:
+        raise InputError("standard input can be read once")
 
 
 def report_error(error: TrajcliError, form: ErrorForm = "text") -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trajcli.cli.outcome import BUG, print_remark, print_text, report_bug, report_error
+from trajcli.cli.outcome import BUG, print_remark, print_text, refuse_two_inputs, report_bug, report_error
 from trajcli.cli.progress import is_terminal, progress
 from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, VerificationError
 from trajcli.grids import Grid
@@ -43,8 +43,7 @@ def run_plan(options: PlanCommand) -> int:
         InputError: When several jobs would be written.
     """
     jobs, form = [options.job, *options.others], options.errors
-    if jobs.count("-") > 1:
-        raise InputError("standard input can be read once")
+    refuse_two_inputs(jobs)
     if len(jobs) > 1:
         _check_nothing_is_written(options)
     if form == "text" or form == "json":

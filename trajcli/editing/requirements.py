@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trajcli.editing.edited_motion import EditedMotion
-from trajcli.errors import Amount, InputError, Problem
+from trajcli.errors import Amount, InputError, Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.judge.motion import Requirements, judge_motion
@@ -89,6 +89,17 @@ def _kept(requirements: Requirements, units: Units) -> KeptLimits:
         requirements = replace(requirements, tool=lambda: ToolJudge(robot))
     say = partial(amount_text, joint_types=robot.joint_types, units=units)
     return KeptLimits(robot, requirements, units, say)
+
+
+def refuse_new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMotion) -> None:
+    """Refuse a motion that jumps where those that it is made of do not.
+
+    Raises:
+        VerificationError: With what `new_jumps` finds.
+    """
+    problems = new_jumps(before, after, *more)
+    if problems:
+        raise VerificationError(*problems)
 
 
 def new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMotion) -> list[Problem]:

@@ -15,7 +15,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, InputError, Problem
 from trajcli.job.model import Job
 from trajcli.job.yaml.load import Document
-from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, ToolLimits
+from trajcli.kinematics.robot import GEOMETRY_HINT, QUANTITIES, Limits, Robot, ToolLimits
 from trajcli.language.limits import OF_ROBOT, EffortBounds, LimitsSpec
 from trajcli.language.numbers import FieldPath
 from trajcli.limits.kinds import JOINT_KINDS, KIND_OF, TOOL_KINDS
@@ -27,7 +27,6 @@ _INERTIA = (
     "give each joint `link: {mass, com, inertia}`, or name a robot that has them: a URDF with inertials, "
     "or one of `trajcli robots`"
 )
-_GEOMETRY = "give each joint its DH row (theta, d, a, alpha) and the robot its convention"
 
 
 class LooserBound(NamedTuple):
@@ -219,7 +218,7 @@ def flaws_of_dynamics(job: Job, robot: Robot, document: Document) -> Iterator[Pr
     for index, move in enumerate(job.moves):
         if move.needs_geometry and robot.convention is None:
             message = f"{move.needs_geometry} needs a robot with geometry, {robot.name} has bare joints"
-            yield Problem(message, _GEOMETRY, document.place(("moves", index)), move=index)
+            yield Problem(message, GEOMETRY_HINT, document.place(("moves", index)), move=index)
 
 
 def _limits_any(bounds: EffortBounds) -> bool:
@@ -232,7 +231,7 @@ def _lacking(robot: Robot, what: str, document: Document, path: FieldPath) -> It
     """Yield what the robot lacks for inverse dynamics."""
     if robot.convention is None:
         message = f"{what} need a robot with geometry, {robot.name} has bare joints"
-        yield Problem(message, _GEOMETRY, document.place(path))
+        yield Problem(message, GEOMETRY_HINT, document.place(path))
         return
     lacking = robot.without_inertia
     if lacking:

@@ -25,7 +25,7 @@ from trajcli.job.model import Job, units_of
 from trajcli.job.robot import RobotSheet, find_sheet
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
-from trajcli.kinematics.robot import Robot, unlimited
+from trajcli.kinematics.robot import GEOMETRY_HINT, Robot, unlimited
 from trajcli.language.limits import JobLimitsSpec, LimitsSpec
 from trajcli.language.numbers import FieldPath, FlawError, ReadingContext
 from trajcli.language.poses import Pose
@@ -463,8 +463,7 @@ def _columns_without_geometry(loaded: LoadedJob) -> Iterator[Problem]:
     for index, group in enumerate(loaded.job.output.columns):
         if group in TOOL_COLUMNS and loaded.robot.convention is None:
             message = f"the columns '{group}' need a robot with geometry, {loaded.robot.name} has bare joints"
-            hint = "give each joint its DH row (theta, d, a, alpha) and the robot its convention"
-            yield Problem(message, hint, loaded.document.place(("output", "columns", index)))
+            yield Problem(message, GEOMETRY_HINT, loaded.document.place(("output", "columns", index)))
 
 
 def _position(problem: Problem) -> tuple[str, int, int]:

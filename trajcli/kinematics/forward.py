@@ -28,7 +28,7 @@ from trajcli.kinematics.columns import (
     scaled,
     total,
 )
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import GEOMETRY_HINT, Robot
 
 _BLOCK = 4096  # configurations at a time: the arrays in use stay in the processor's cache
 
@@ -68,7 +68,7 @@ def links_of(robot: Robot) -> tuple[Link, ...]:
     if robot.convention is None:
         raise InputError(
             f"robot {robot.name} has bare joints and no geometry",
-            hint="give each joint its DH row (theta, d, a, alpha) and the robot its convention",
+            hint=GEOMETRY_HINT,
         )
     none = (0.0, 1.0, 0.0)
     cosines, sines = cos_sin([joint.alpha for joint in robot.joints])

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 JointType = Literal["revolute", "prismatic"]
 Convention = Literal["standard", "modified"]
 QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+GEOMETRY_HINT = "give each joint its DH row (theta, d, a, alpha) and the robot its convention"
+"""What gives bare joints a geometry."""
 
 GRAVITY = (0.0, 0.0, -9.81)
 """Acceleration of a body that falls, in world, m/s^2, where nothing else is said."""

@@ -16,7 +16,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError
 from trajcli.frozen import comparable
 from trajcli.job.read import files_of
-from trajcli.kinematics.robot import Robot
+from trajcli.kinematics.robot import GEOMETRY_HINT, Robot
 from trajcli.knots import Knots, knots_of
 from trajcli.planning.plan import Plan
 from trajcli.streams.mcap.messages import OF_GEOMETRY
@@ -83,7 +83,7 @@ def check_log_options(options: LogOptions, robot: Robot, start_time: float) -> N
         if robot.convention is None and topic in OF_GEOMETRY:
             raise InputError(
                 f"--topics: {topic} is about a tool, and robot {robot.name} has no geometry",
-                hint="give each joint its DH row (theta, d, a, alpha) and the robot its convention",
+                hint=GEOMETRY_HINT,
             )
     _origin(options, start_time)
 

@@ -19,6 +19,7 @@ _FIRST_DECIMALS = re.compile(
     rb"(?:^|[;\t \"])[+-]?[0-9]*([.,])[0-9]+(?:[eE][+-]?[0-9]+)?(?=[;\t \"\r]|$)", re.MULTILINE
 )
 _COMMENT = (b"#", b"%")
+_HEAD = "a CSV begins with a line of the columns' names"
 
 
 def is_number(cell: bytes) -> bool:
@@ -74,11 +75,10 @@ def read_header(stream: BinaryIO, file: str) -> tuple[Header, bytes]:
 
 def _line(stream: BinaryIO, file: str, number: int = 1) -> bytes:
     line = stream.readline(LONGEST_LINE)
-    hint = "a CSV begins with a line of the columns' names"
     if not line and number == 1:
-        raise InputError(f"{file} is empty", hint=hint)
+        raise InputError(f"{file} is empty", hint=_HEAD)
     if b"\0" in line or len(line) == LONGEST_LINE:
-        raise InputError(f"{file} is not text", hint=hint)
+        raise InputError(f"{file} is not text", hint=_HEAD)
     return line
 
 
@@ -88,7 +88,7 @@ def _decoded(line: bytes, file: str) -> str:
     except UnicodeDecodeError:
         pass
     if any(byte < 9 or 0x80 <= byte < 0xA0 for byte in line):  # no letters in any code of a byte each
-        raise InputError(f"{file} is not text", hint="a CSV begins with a line of the columns' names")
+        raise InputError(f"{file} is not text", hint=_HEAD)
     return line.decode("latin-1").rstrip("\r\n")
 
 

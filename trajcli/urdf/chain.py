@@ -16,7 +16,7 @@ from trajcli.curves.piecewise import Array, read_only
 from trajcli.errors import InputError
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import cos_sin, quaternion_from_matrix
-from trajcli.kinematics.robot import Joint, Robot
+from trajcli.kinematics.robot import GEOMETRY_HINT, Joint, Robot
 
 WORLD, FIRST_LINK, TOOL = "world", "base_link", "tool0"
 
@@ -108,7 +108,7 @@ def chain_of(robot: Robot) -> UrdfChain:
     if robot.convention is None:
         raise InputError(
             f"robot {robot.name} has bare joints and no geometry, so there is no URDF of it",
-            hint="give each joint its DH row (theta, d, a, alpha) and the robot its convention",
+            hint=GEOMETRY_HINT,
         )
     cuts = [_cut(joint, modified=robot.convention == "modified") for joint in robot.joints]
     before, after = zip(*cuts, strict=True)
