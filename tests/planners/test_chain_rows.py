@@ -15,9 +15,18 @@ from trajcli.kinematics.robot import Limits
 from trajcli.kinematics.zone import Zone, ZoneAround
 from trajcli.planners.course import joint_line
 from trajcli.planners.flying_by.between_stops import chain_of
-from trajcli.planners.flying_by.chain_parts import BorderNode, PathPart, ZonePart, joint_rates
+from trajcli.planners.flying_by.chain_parts import (
+    BorderNode,
+    ChainRow,
+    PathPart,
+    ZonePart,
+    backwards,
+    joint_bounds,
+    joint_rates,
+    row_of,
+    slowed,
+)
 from trajcli.planners.flying_by.motion_search import with_shares
-from trajcli.planners.flying_by.row import ChainRow, backwards, joint_bounds, row_of, slowed
 
 PATH = np.array([-2.0, 2.0, -3.0, 5.0, -40.0, 60.0])
 MIRROR = np.array([1.0, -1.0])

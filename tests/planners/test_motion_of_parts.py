@@ -18,6 +18,7 @@ from trajcli.kinematics.robot import Payload
 from trajcli.planners.course import JointCourse
 from trajcli.planners.flying_by import flown_parts as parts_module
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
+from trajcli.planners.flying_by.chain_parts import row_of
 from trajcli.planners.flying_by.flown_parts import (
     CourseLaws,
     FlownPart,
@@ -30,7 +31,6 @@ from trajcli.planners.flying_by.flown_parts import (
     zone_motion,
 )
 from trajcli.planners.flying_by.motion_search import with_shares
-from trajcli.planners.flying_by.row import row_of
 
 
 def ruckig_of(first: np.ndarray, last: np.ndarray, bounds: np.ndarray) -> Trajectory:

@@ -23,7 +23,7 @@ from trajcli.kinematics.zone import ZoneAround
 from trajcli.planners.flying_by import flown_parts as looked_for
 from trajcli.planners.flying_by import motion_search
 from trajcli.planners.flying_by.between_stops import FlyByChain, chain_of
-from trajcli.planners.flying_by.chain_parts import BorderNode, PathPart
+from trajcli.planners.flying_by.chain_parts import BorderNode, PathPart, row_of
 from trajcli.planners.flying_by.flown_parts import (
     CourseLaws,
     FlownPart,
@@ -34,7 +34,6 @@ from trajcli.planners.flying_by.flown_parts import (
 )
 from trajcli.planners.flying_by.flown_parts import _law_between as law_between
 from trajcli.planners.flying_by.motion_search import POWERS, duration_of, with_shares
-from trajcli.planners.flying_by.row import row_of
 from trajcli.planners.flying_by.search import FoundStates, begin_search
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
 from trajcli.planning.plan import plan_job

@@ -45,6 +45,12 @@ def start_in_motion(planner: str, start: State, robot: Robot) -> PlanningError:
     return PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
 
 
+def unknown_duration(planner: str, quantity: str, joints: Sequence[int], robot: Robot) -> MissingLimitError:
+    """Return the error that asks for a limit from which the duration of a move follows."""
+    why = "to find its fastest duration"
+    return missing_limit(planner, quantity, joints, robot, why, "give the move a `duration`")
+
+
 def missing_limit(
     planner: str, quantity: str, joints: Sequence[int], robot: Robot, why: str, *also: str
 ) -> MissingLimitError:

@@ -22,8 +22,14 @@ from trajcli.kinematics.robot import Limits
 from trajcli.limits.kinds import limited_part, part_findings
 from trajcli.planners.course import Course
 from trajcli.planners.flying_by.between_stops import FlyByChain
-from trajcli.planners.flying_by.chain_parts import ChainPart, PathPart, joint_rates
-from trajcli.planners.flying_by.row import ChainRow, joint_bounds, slowed
+from trajcli.planners.flying_by.chain_parts import (
+    ChainPart,
+    ChainRow,
+    PathPart,
+    joint_bounds,
+    joint_rates,
+    slowed,
+)
 from trajcli.planners.ruckig import BoundaryProblem, fastest, together
 from trajcli.trajectory import MoveInterval, Span, State, Trajectory
 

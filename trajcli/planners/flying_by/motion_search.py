@@ -21,7 +21,7 @@ from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.limits.kinds import TOOL_KINDS
 from trajcli.planners.flying_by.between_stops import FlyByChain
-from trajcli.planners.flying_by.chain_parts import PathPart
+from trajcli.planners.flying_by.chain_parts import ChainRow, PathPart, backwards, row_of
 from trajcli.planners.flying_by.flown_parts import (
     CourseLaws,
     FlownPart,
@@ -31,7 +31,6 @@ from trajcli.planners.flying_by.flown_parts import (
     joint_uses,
     zone_motion,
 )
-from trajcli.planners.flying_by.row import ChainRow, backwards, row_of
 from trajcli.planners.flying_by.search import FoundStates, begin_search
 from trajcli.planners.flying_by.stopping_laws import StoppingLaws
 

@@ -11,7 +11,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.curves.rest_to_rest import PEAKS, cycloid_law
 from trajcli.kinematics.robot import Robot
 from trajcli.language.targets import Duration
-from trajcli.planners.boundary_states import missing_limit, same_state, standstill, start_in_motion
+from trajcli.planners.boundary_states import same_state, standstill, start_in_motion, unknown_duration
 from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
@@ -66,8 +66,5 @@ class Cycloidal(PointToPoint):
         longest = np.max(durations, axis=0)
         lacking = np.flatnonzero((displacement != 0) & (longest == 0))
         if lacking.size:
-            why = "to find its fastest duration"
-            raise missing_limit(
-                self.tag, "velocity", lacking.tolist(), robot, why, "give the move a `duration`"
-            )
+            raise unknown_duration(self.tag, "velocity", lacking.tolist(), robot)
         return float(longest.max())

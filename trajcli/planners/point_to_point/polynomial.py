@@ -14,7 +14,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import PlanningError, Problem, TrajcliError
 from trajcli.kinematics.robot import QUANTITIES, Limits, Robot, share_of_limits
 from trajcli.language.targets import Duration
-from trajcli.planners.boundary_states import missing_limit, same_state, standstill
+from trajcli.planners.boundary_states import same_state, standstill, unknown_duration
 from trajcli.planners.planner import Planned
 from trajcli.planners.point_to_point.point_to_point import PointToPoint
 from trajcli.trajectory import State
@@ -74,10 +74,9 @@ def fastest_duration(planner: str, start: Array, end: Array, robot: Robot) -> fl
     bounded = np.any([np.isfinite(robot.limits.of_order(order)).all(axis=1) for order in (1, 2, 3)], axis=0)
     lacking = np.flatnonzero(moving & ~bounded)
     if lacking.size:
-        why = "to find its fastest duration"
         differ = (start[:, lacking] != end[:, lacking]).any(axis=1)
         quantity = QUANTITIES[1 + int(differ.argmax())]  # with a bound on it, the least duration is known
-        raise missing_limit(planner, quantity, lacking.tolist(), robot, why, "give the move a `duration`")
+        raise unknown_duration(planner, quantity, lacking.tolist(), robot)
     if not start[1:].any() and not end[1:].any():
         return _from_rest_to_rest(start, end, robot.limits)
     return _by_search(planner, start, end, robot)
@@ -110,8 +109,7 @@ def _by_search(planner: str, start: Array, end: Array, robot: Robot) -> float:
     if low == 0:
         joints = np.flatnonzero((start != end).any(axis=0) | start[1:].any(axis=0)).tolist()
         quantity = "jerk" if np.isfinite(robot.limits.acceleration[joints]).all() else "acceleration"
-        why = "to find its fastest duration"
-        raise missing_limit(planner, quantity, joints, robot, why, "give the move a `duration`")
+        raise unknown_duration(planner, quantity, joints, robot)
 
     def excess(durations: Array) -> Array:
         return _share(start, end, durations, robot.limits) - (1 + _ROOM)
