@@ -26,7 +26,7 @@ from trajcli.queries.calibration import (
     plan_report,
     planned_measurements,
 )
-from trajcli.streams.whole_file import refuse_overwriting, whole_file
+from trajcli.streams.whole_file import refuse_overwriting, write_content
 from trajcli.units import Quantity
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def run_calibrate(options: CalibrateCommand) -> int:
     )
     calibration = calibration_of(arm, options.file, options.free, chosen)
     if options.output is not None:
-        _write(calibrated_text(calibration, open_sheet(options.robot)).encode(), options.output)
+        write_content(calibrated_text(calibration, open_sheet(options.robot)).encode(), options.output)
     if options.as_json:
         print_json(calibration_report(calibration))
         return 0
@@ -100,11 +100,6 @@ def _positive(value: float, name: str) -> float:
     if not 0 < value < np.inf:
         raise InputError(f"{name} must be above 0 and finite, got {value:.6g}")
     return value
-
-
-def _write(content: bytes, path: str) -> None:
-    with whole_file(path) as out:
-        out.write(content)
 
 
 def _lines(calibration: Calibration) -> Iterator[str]:
@@ -175,7 +170,7 @@ def _plan(arm: ArmInUnits, length: float | None, options: CalibrateCommand) -> i
     joints, plan, parameters = planned_measurements(arm, count, options.free, length, options.file, part)
     rows = _csv(arm, joints)
     if options.output is not None:
-        _write(rows, options.output)
+        write_content(rows, options.output)
     if options.as_json:
         print_json(plan_report(arm, joints, plan, parameters))
     elif options.output is None:

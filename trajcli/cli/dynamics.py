@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trajcli.cli.numbers import matrix_lines, number, table_lines
-from trajcli.cli.outcome import print_json, print_lines, print_remark
+from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
 from trajcli.errors import InputError
 from trajcli.job.inline import inline_payload
 from trajcli.kinematics.robot import Robot
 from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
 from trajcli.queries.dynamics import dynamics_report, efforts_of, left_out
-from trajcli.streams.whole_file import standard_output
 from trajcli.units import effort_unit
 
 if TYPE_CHECKING:
@@ -79,7 +78,6 @@ def _used(tau: float, bounds: tuple[float, float]) -> tuple[str, str]:
 
 
 def _stream(arm: ArmInUnits, options: DynamicsCommand) -> int:
-    from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
 
     given = {"--json": options.as_json, "--qd": options.rates, "--qdd": options.accelerations}
@@ -89,8 +87,7 @@ def _stream(arm: ArmInUnits, options: DynamicsCommand) -> int:
     watch, rows = LimitWatch(arm.robot), open_rows("-")
     columns, blocks = efforts_of(arm, rows, watch)
     missing = left_out(rows)
-    with standard_output() as out:
-        write_csv(blocks, columns, out, options.digits)
+    print_rows(columns, blocks, options.digits)
     if missing:
         print_remark(f"without columns {' and '.join(missing)}, which count as zero")
     if watch.remark is not None:

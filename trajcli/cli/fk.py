@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import pose_lines
-from trajcli.cli.outcome import print_json, print_lines, print_remark
+from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
 from trajcli.errors import InputError
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.queries.arm import ArmInUnits, LimitWatch, frame_of_rows, job_of_arm, open_arm
 from trajcli.queries.pose import pose_view
-from trajcli.streams.csv import write_csv
-from trajcli.streams.whole_file import standard_output
 
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import FkCommand
@@ -73,8 +71,7 @@ def _stream(arm: ArmInUnits, options: FkCommand) -> int:
     watch, job = LimitWatch(arm.robot), job_of_arm(options.robot)
     watch.frame = None if job is None else frame_of_rows(job)
     columns, blocks = poses_of(arm, open_rows("-"), watch)
-    with standard_output() as out:
-        write_csv(blocks, columns, out, options.digits)
+    print_rows(columns, blocks, options.digits)
     _remark(arm, watch, rows=True)
     if watch.tool_off > _SAME_TOOL and options.frame == "world":
         off = f"the rows say where their tcp is, up to {watch.tool_off:.6g} m from that of {arm.robot.name}"

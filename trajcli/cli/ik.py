@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.linalg import inv
 
 from trajcli.cli.numbers import number, numbers
-from trajcli.cli.outcome import print_json, print_lines, print_remark
+from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.inline import inline_target
@@ -122,7 +122,6 @@ def _pose_text(arm: ArmInUnits, pose: Array) -> str:
 
 def _stream(arm: ArmInUnits, near: Array | None, options: IkCommand) -> int:
     from trajcli.queries.inverse_stream import EveryAnswer, joints_of
-    from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
     from trajcli.streams.whole_file import standard_output
 
@@ -137,6 +136,5 @@ def _stream(arm: ArmInUnits, near: Array | None, options: IkCommand) -> int:
             raise PlanningError(f"no answer to row {answers.missed} (from 0) is within the limits", hint=hint)
         return 0
     columns, blocks = joints_of(arm, open_rows("-"), near, options.tolerance)
-    with standard_output() as out:
-        write_csv(blocks, columns, out, options.digits)
+    print_rows(columns, blocks, options.digits)
     return 0

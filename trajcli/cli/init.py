@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from trajcli.cli.outcome import print_remark
 from trajcli.errors import InputError
-from trajcli.streams.whole_file import kind_of, standard_output, whole_file
+from trajcli.streams.whole_file import kind_of, write_content
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import InitCommand
@@ -26,12 +26,10 @@ def run_init(options: InitCommand) -> int:
     file = options.file
     text = STARTER.read_bytes()
     if file == "-":
-        with standard_output() as out:
-            out.write(text)
+        write_content(text)
         return 0
     if not options.force and kind_of(file) is not None:
         raise InputError(f"{file} exists", hint="name another file, or say --force to overwrite it")
-    with whole_file(file) as out:
-        out.write(text)
+    write_content(text, file)
     print_remark(f"{file} written; now: trajcli plan {quote(file)} > out.csv")
     return 0

@@ -6,11 +6,10 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import matrix_lines, number, numbers
-from trajcli.cli.outcome import print_json, print_lines, print_remark
+from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
 from trajcli.errors import InputError
 from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
 from trajcli.queries.jacobian import jacobian_report
-from trajcli.streams.whole_file import standard_output
 
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import JacobianCommand
@@ -71,7 +70,6 @@ def _sum(factors: Sequence[float], names: Sequence[str]) -> str:
 
 def _stream(arm: ArmInUnits, options: JacobianCommand) -> int:
     from trajcli.queries.forward import jacobians_of
-    from trajcli.streams.csv import write_csv
     from trajcli.streams.table import open_rows
 
     for name, given in (("--json", options.as_json), ("--qd", options.rates is not None)):
@@ -79,8 +77,7 @@ def _stream(arm: ArmInUnits, options: JacobianCommand) -> int:
             raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
     watch = LimitWatch(arm.robot)
     columns, blocks = jacobians_of(arm, open_rows("-"), options.frame, watch)
-    with standard_output() as out:
-        write_csv(blocks, columns, out)
+    print_rows(columns, blocks)
     if watch.remark is not None:
         print_remark(watch.remark)
     return 0

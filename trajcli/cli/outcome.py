@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal, TextIO
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from trajcli.cli.progress import columns, is_terminal
 from trajcli.errors import LONGEST_LINE, InputError, Problem, TrajcliError
+
+if TYPE_CHECKING:
+    from trajcli.columns import Column
+    from trajcli.curves.piecewise import Array
+    from trajcli.streams.decimals import Digits
 
 ErrorForm = Literal["text", "json", "github", "junit", "sarif"]
 
@@ -158,10 +163,24 @@ def print_text(text: str) -> None:
         FileError: When standard output cannot be written.
         BrokenPipeError: When its reader has closed it.
     """
-    from trajcli.streams.whole_file import standard_output  # `--help` writes by other means
+    from trajcli.streams.whole_file import write_content  # `--help` writes by other means
+
+    write_content(text.encode(errors="backslashreplace"))
+
+
+def print_rows(columns: Sequence[Column], blocks: Iterable[Array], digits: Digits = "fixed") -> None:
+    """Print rows as CSV, block by block, with a line of names in front.
+
+    Raises:
+        InputError: When a block cannot be computed.
+        FileError: When standard output cannot be written.
+        BrokenPipeError: When its reader has closed it.
+    """
+    from trajcli.streams.csv import write_csv
+    from trajcli.streams.whole_file import standard_output
 
     with standard_output() as out:
-        out.write(text.encode(errors="backslashreplace"))
+        write_csv(blocks, columns, out, digits)
 
 
 def print_remark(text: str, *, verdict: bool = False) -> None:

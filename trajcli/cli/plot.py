@@ -22,7 +22,7 @@ from trajcli.plots.picture import picture_of
 from trajcli.plots.write import format_of_picture, rendered
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import is_job, read_table
-from trajcli.streams.whole_file import kind_of, refuse_overwriting, standard_output, whole_file
+from trajcli.streams.whole_file import kind_of, refuse_overwriting, write_content
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import PlotCommand
@@ -58,7 +58,7 @@ def run_plot(options: PlotCommand) -> int:
     with np.errstate(all="ignore"):  # what is not finite was found by the checks
         judgements = [None if checked is None else checked.judgement for checked in judged]
         picture = picture_of(plan, tables, wanted, joints, judgements, second)
-        _write(rendered(picture, kind), target)
+        write_content(rendered(picture, kind), target)
     if target != "-" and not options.quiet:
         print_remark(f"{target} written")
     _refuse_findings(plans, judged, options)
@@ -135,8 +135,3 @@ def _sorted_out(files: Sequence[str], overrides: Sequence[str]) -> tuple[list[st
 
 def _stem(name: str) -> str:
     return "plot" if name == "-" else Path(name).stem
-
-
-def _write(content: bytes, target: str) -> None:
-    with standard_output() if target == "-" else whole_file(target) as out:
-        out.write(content)

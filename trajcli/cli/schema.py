@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from trajcli.job.schema import schema_text
-from trajcli.streams.whole_file import standard_output
+from trajcli.streams.whole_file import write_content
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import SchemaCommand
@@ -17,6 +17,5 @@ def run_schema(options: SchemaCommand) -> int:
     Raises:
         FileError: When standard output cannot be written.
     """
-    with standard_output() as out:
-        out.write(schema_text(options.kind).encode())
+    write_content(schema_text(options.kind).encode())
     return 0

@@ -24,7 +24,7 @@ from trajcli.errors import InputError, TrajcliError, utf8
 from trajcli.job.read import files_of
 from trajcli.job.yaml.document import read_bytes
 from trajcli.job.yaml.load import parse_document
-from trajcli.streams.whole_file import refuse_overwriting, standard_output
+from trajcli.streams.whole_file import refuse_overwriting, write_content
 
 if TYPE_CHECKING:
     from trajcli.cli.motion_commands import SweepCommand
@@ -77,8 +77,7 @@ def run_sweep(options: SweepCommand) -> int:
 def _print_table(table: SweepTable, form: Form) -> None:
     """Write a table to standard output; on a terminal one that fits its width, with colours of verdicts."""
     if not is_terminal(sys.stdout):
-        with standard_output() as out:
-            out.write(table.text(form).encode())
+        write_content(table.text(form).encode())
         return
     from trajcli.cli.terminal import BOLD, GREEN, RED, fitted_table, on_terminal, painted
 

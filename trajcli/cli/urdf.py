@@ -8,7 +8,7 @@ from trajcli.cli.outcome import print_remark, print_text
 from trajcli.errors import InputError, Place
 from trajcli.job.dump import dump_robot
 from trajcli.job.robot import read_urdf, urdf_sheet
-from trajcli.streams.whole_file import refuse_overwriting, whole_file
+from trajcli.streams.whole_file import refuse_overwriting, write_content
 
 if TYPE_CHECKING:
     from trajcli.cli.arm_commands import UrdfCommand
@@ -45,5 +45,4 @@ def run_urdf(options: UrdfCommand) -> int:
 
 def _write(text: str, file: str, output: str) -> None:
     refuse_overwriting([("the robot file", output)], [] if file == "-" else [("the URDF", file)])
-    with whole_file(output) as out:
-        out.write(text.encode())
+    write_content(text.encode(), output)

@@ -17,7 +17,7 @@ from trajcli.player.page import check_page_name, page_of
 from trajcli.player.scene import BUDGET, scene_of_plan, scene_of_two
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import holds_motion, is_job
-from trajcli.streams.whole_file import refuse_overwriting, standard_output, whole_file
+from trajcli.streams.whole_file import refuse_overwriting, write_content
 
 if TYPE_CHECKING:
     from trajcli.cli.file_commands import ViewCommand
@@ -63,7 +63,7 @@ def write_comparison(first: str, second: str, output: str, robot: str | None) ->
     """
     shown = [_shown_file(name, robot, output, BUDGET) for name in (first, second)]
     page = page_of(scene_of_two(*(one.scene for one in shown)))
-    _write(page, output)
+    write_content(page, output)
     print_remark(f"{output} ({len(page) / 1e6:.2f} MB) plays both")
 
 
@@ -82,7 +82,7 @@ def _written(shown: Sequence[_Shown], options: ViewCommand) -> int:
     if len(shown) > 1:
         scene = scene_of_two(scene, shown[1].scene)
     page = page_of(scene, compress=options.compress)
-    _write(page, options.output)
+    write_content(page, options.output)
     wrong = [one.problems for one in shown if one.problems is not None]
     after = "; the page shows the findings" if wrong and not holds_motion(options.sources[0]) else ""
     print_remark(f"{'; '.join(one.said for one in shown)}{_where(page, options.output)}{after}", verdict=True)
@@ -149,11 +149,6 @@ def _check_output(path: str | None) -> None:
 def _check_inputs_stay(output: str | None, inputs: Iterable[tuple[str, str]]) -> None:
     if output not in (None, "-"):
         refuse_overwriting([("the page", str(output))], inputs)
-
-
-def _write(page: bytes, path: str | None) -> None:
-    with standard_output() if path is None or path == "-" else whole_file(path) as out:
-        out.write(page)
 
 
 def _where(page: bytes, path: str | None) -> str:

@@ -17,7 +17,7 @@ from trajcli.progress import report_progress
 from trajcli.samples import sample
 from trajcli.streams.decimals import Digits
 from trajcli.streams.formats import Goal, StreamFormat, WriteOptions, format_of, write_verified
-from trajcli.streams.whole_file import standard_output, whole_file
+from trajcli.streams.whole_file import standard_output, write_content
 from trajcli.units import Units
 
 if TYPE_CHECKING:
@@ -141,5 +141,4 @@ def write_text(text: str, path: str) -> None:
         FileError: When it cannot be written.
         BrokenPipeError: When the reader has closed the pipe.
     """
-    with standard_output() if path == "-" else whole_file(path) as out:
-        out.write(text.encode())
+    write_content(text.encode(), path)

@@ -85,6 +85,17 @@ def standard_output() -> Iterator[BinaryIO]:
             yield stream
 
 
+def write_content(content: bytes, path: str | Path | None = None) -> None:
+    """Write a file, which appears whole or not at all; None and "-" are standard output.
+
+    Raises:
+        FileError: When it cannot be written.
+        BrokenPipeError: When the reader of the pipe has closed it.
+    """
+    with standard_output() if path in (None, "-") else whole_file(str(path)) as out:
+        out.write(content)
+
+
 @contextmanager
 def _nothing_after_failure(stream: BinaryIO) -> Iterator[None]:
     """Drop what a failed block has left in the buffer: closing would wait for a reader that has stopped."""
