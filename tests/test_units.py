@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from any_text import CHARACTERS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -169,8 +170,10 @@ def test_degrees_as_the_standard_library_converts_them(value: float) -> None:
 
 @settings(deadline=None, max_examples=300)
 @given(
-    st.text(max_size=20)
-    | st.from_regex(r"[-+.0-9e]{1,5} ?(deg|mm|s|rpm|Hz)(/s|/min)?(\^2|³)?", fullmatch=True)
+    st.text(CHARACTERS, max_size=20)
+    | st.from_regex(
+        r"[-+.0-9e]{1,5} ?(deg|mm|s|rpm|Hz)(/s|/min)?(\^2|³)?", fullmatch=True, alphabet=CHARACTERS
+    )
 )
 def test_any_string_is_a_finite_number_or_refused(text: str) -> None:
     for quantity in (VELOCITY, LENGTH, TIME, FREQUENCY, RATIO):

@@ -9,6 +9,7 @@ import unicodedata
 
 import numpy as np
 import pytest
+from any_text import CHARACTERS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -186,7 +187,12 @@ def test_control_characters_of_messages_are_shown_as_escapes() -> None:
 
 @pytest.mark.full
 @settings(deadline=None, max_examples=200)
-@given(st.text(max_size=250), st.integers(1, 260), st.integers(1, 260), st.text(max_size=120))
+@given(
+    st.text(CHARACTERS, max_size=250),
+    st.integers(1, 260),
+    st.integers(1, 260),
+    st.text(CHARACTERS, max_size=120),
+)
 def test_any_place_makes_a_frame(source: str, column: int, length: int, text: str) -> None:
     rows = render_problem(
         Problem(text, text or None, Place("f", 1, column, source, length)), color=False

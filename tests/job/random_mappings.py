@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from trajcli.language.numbers import NO_NAMES
 
 ANGLES = {"rad": 1.0, "deg": 57.0}
-NAMES = st.text(
-    st.characters(codec="utf-8", exclude_categories=("Cs", "Cn", "Co")), min_size=1, max_size=8
-).filter(lambda name: name.isprintable() and name == name.strip())
+NAMES = st.text(st.characters(exclude_categories=("Cs", "Cn", "Co")), min_size=1, max_size=8).filter(
+    lambda name: name.isprintable() and name == name.strip()
+)
 
 POINT_NAMES = NAMES.filter(
     lambda name: name not in NO_NAMES and re.fullmatch(r"[-+]?[.0-9]+[.eE0-9+-]*", name) is None

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from any_text import CHARACTERS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -459,7 +460,11 @@ ALPHABET = st.text(st.sampled_from("tq12 ,;\t\n.#%-eE\"'xNa[]deg_:{}\r\x00é"), 
 
 
 @settings(max_examples=300, deadline=None)
-@given(st.one_of(ALPHABET, st.text(max_size=50), ALPHABET.map(lambda text: "t,q1,q2\n0,1,2\n" + text)))
+@given(
+    st.one_of(
+        ALPHABET, st.text(CHARACTERS, max_size=50), ALPHABET.map(lambda text: "t,q1,q2\n0,1,2\n" + text)
+    )
+)
 def test_any_text_is_a_motion_or_an_error(tmp_path_factory, text):
     path = tmp_path_factory.mktemp("fuzz") / "in.txt"
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
