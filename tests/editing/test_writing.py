@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,18 @@ def test_a_table_is_written_as_it_was(tmp_path: Path, text: str) -> None:
     out = io.BytesIO()
     write_table(read(tmp_path / "rows.csv", text), out)
     assert out.getvalue().decode() == text
+
+
+def test_numbers_with_every_bit_have_no_digits_beyond_it(tmp_path: Path) -> None:
+    """In the shortest text that reads as the same number, though another one of the column has 30 decimals."""
+    given = [(0.1234567890123456, 1.3e-17), (5.004, -0.000046666666666666666), (5.008, 1 / 3)]
+    text = "t,q1\n" + "".join(f"{t!r},{q!r}\n" for t, q in given)
+    out = io.BytesIO()
+    write_table(read(tmp_path / "rows.csv", text), out)
+    cells = [cell for line in out.getvalue().decode().splitlines()[1:] for cell in line.split(",")]
+    numbers = [number for row in given for number in row]
+    assert [float(cell) for cell in cells] == numbers
+    assert [Decimal(cell) for cell in cells] == [Decimal(repr(number)) for number in numbers]
 
 
 @pytest.mark.parametrize("text", TABLES)

@@ -28,6 +28,7 @@ from trajcli.version import __version__
 
 _PER_SECOND = 1_000_000_000
 _LATEST = 2**31 - 1  # s: what a time of ROS 2 can say
+_HELD = 15  # decimals: a number of 64 bits surely has so many digits; with more, all its own are written
 
 
 def write_motion(motion: EditedMotion, path: str | None, form: FormatName | None = None) -> tuple[str, ...]:
@@ -99,6 +100,7 @@ def _header(names: Iterable[str]) -> bytes:
 
 def _encoded(block: Array, decimals: list[int | None]) -> bytes:
     """Return lines of numbers with the decimals of each column; None for all digits."""
+    decimals = [count if (count or 0) <= _HELD else None for count in decimals]
     whole = [index for index, count in enumerate(decimals) if count == 0]
     if all(count in (0, DECIMALS) for count in decimals):
         return encoder_of("fixed")(block, whole)
