@@ -143,6 +143,7 @@ BAD_CALLS = [
     (["--robot", "ur5ee", *HOME], 2, "did you mean 'ur5e'?"),
     (["--robot", "none.yaml", *HOME], 4, "there is no file 'none.yaml'"),
     (["--robot", "ur5e", "1", "2"], 2, "q has 2 values, UR5e has 6 joints"),
+    (["--robot", "ur5e", "rows.csv"], 2, "wrist_3_joint (deg); `- < FILE` reads rows of a CSV"),
     (["--robot", "ur5e", *HOME[:5], "nan"], 2, "q of wrist_3_joint: expected a number (deg), got nan"),
     (["--robot", "ur5e", *HOME[:5], "1e400"], 2, "expected a magnitude of at most"),
     (["--robot", "ur5e", *HOME[:5], "10mm"], 2, "expected an angle"),

@@ -90,7 +90,7 @@ class ArmInUnits:
             raise InputError(
                 f"{name} has {len(values)} value{'s' * (len(values) != 1)}, "
                 f"{self.robot.name} has {count} joint{'s' * (count != 1)}",
-                hint=f"they are {units}",
+                hint=f"they are {units}" + "; `- < FILE` reads rows of a CSV" * (name == "q"),
             )
         from trajcli.job.inline import inline_number
 
