@@ -111,6 +111,27 @@ def test_on_a_path_the_rail_goes_evenly_with_s() -> None:
     assert q[0] == pytest.approx(3.4, abs=1e-6)
 
 
+def test_the_course_along_which_zones_are_flown_keeps_the_rail() -> None:
+    line = {"planner": "line", "to": {"xyz": [4.5, 0.2, 0.9], "joints": {"rail": 3.4}}, "law": LAW}
+    move = planned(go(joints={"rail": 1.0}), line).moves[1]
+    curve = move.planner.course(move.start.position, move.robot, move.planned).curve
+    share = np.linspace(0, 1, 5)
+    rail = curve.evaluate(curve.start + share * (curve.end - curve.start), side="left")[:, 0]
+    np.testing.assert_allclose(rail, 1.0 + 2.4 * share, atol=1e-5)
+
+
+def test_nothing_is_pinned_where_segments_overlap_in_time() -> None:
+    ends = ({"xyz": [2.6, 0.2, 0.9]}, {"xyz": [2.6, 0.3, 0.9], "joints": {"rail": 1.2}})
+    path = {
+        "planner": "path",
+        "corner": "overlap",
+        "overlap": 0.1,
+        "segments": [{"line": end} for end in ends],
+    }
+    said = refused(go(joints={"rail": 1.0}), {**path, "law": {"speed": 0.2, "acceleration": 1}})
+    assert "no joint is pinned where segments overlap in time" in said
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(
     "law", [{"shape": "quintic", "speed": 0.4, "acceleration": 1}, {"shape": "time_optimal"}]
