@@ -130,3 +130,12 @@ def test_a_pose_of_a_later_move_is_named_where_it_stands() -> None:
     lines = (HEAD + moves).splitlines()
     assert problem.place.line == len(lines)
     assert lines[-1][problem.place.column - 1 :].startswith(away)
+
+
+def test_a_path_between_points_in_reach_is_named_as_a_whole() -> None:
+    """It passes too near to the base: neither of its ends is wrong."""
+    line = "{planner: line, to: {xyz: [-430, -100, 300], rpy: [180, 0, 0]}}"
+    problem = refused(f"  - {line}\n")
+    assert "does not reach the path beyond" in problem.message
+    assert problem.place is not None
+    assert (problem.place.line, problem.place.column) == (len(HEAD.splitlines()) + 1, 5)

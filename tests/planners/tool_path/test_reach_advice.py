@@ -47,3 +47,27 @@ def test_a_target_by_joints_says_how_the_way_to_its_place_is_free():
     plan("elbow4r", start, line({"xyz": xyz.tolist()}, law=LAW), limits=FREE)
     pose = refusal("elbow4r", start, line({"xyz": xyz.tolist(), "rpy": [0, 0, 0]}, law=LAW), limits=FREE)
     assert "alone" not in pose.problems[0].advice()
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "to", "helps"),
+    [
+        ("planar2r", [0.3, 2.0], [3.4, 2.0], False),
+        ("planar3r", [0.3, 0.7, 0.4], [3.3, 0.7, 0.4], True),
+        pytest.param(
+            *("ur5e", [0.3, -1.4, 1.6, -1.7, -1.5, 0.1], [3.3, -1.4, 1.6, -1.7, -1.5, 0.1], False),
+            marks=pytest.mark.full,
+        ),
+    ],
+)
+def test_a_place_alone_is_proposed_where_it_leaves_more_free(
+    name: str, start: list[float], to: list[float], helps: bool
+) -> None:
+    """From one side of the base to the other, too near to it: two joints are decided by the place as it is."""
+    error = refusal(name, {"joints": start}, line({"joints": to}, law=LAW), limits=FREE)
+    assert "does not reach the path beyond" in str(error)
+    assert ("give the target by `xyz` alone" in error.problems[0].advice()) == helps
+    xyz = forward(arm(name), np.array(to))[:3, 3].tolist()
+    placed = refusal(name, {"joints": start}, line({"xyz": xyz}, law=LAW), limits=FREE)
+    assert "alone" not in placed.problems[0].advice()
+    assert ("does not reach" in str(placed)) == (not helps)

@@ -271,7 +271,7 @@ def _about_target(error: PlanningError, planned: PlannedPath, robot: Robot) -> P
         return PlanningError(*error.problems)
     missed = ~solve(robot, planned.path.at_s(s, "left").target(), None).valid.any(axis=-1)
     field = planned.targets[int(missed.argmax())][0] if missed.any() else None
-    few = planned.arrival is not None and len(robot.joints) < _ALL_SIX
+    few = planned.arrival is not None and planned.path.orientation == "all" and len(robot.joints) < _ALL_SIX
     also = ", or give the target by `xyz` alone" * few
     return PlanningError(*(replace(each, field=field, hint=f"{each.hint}{also}") for each in error.problems))
 
