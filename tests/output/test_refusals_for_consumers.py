@@ -13,6 +13,7 @@ from scipy.interpolate import BPoly
 
 from trajcli.errors import InputError, VerificationError
 from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.kinematics.robot import point_mass
 from trajcli.output.consumer import job_for
 from trajcli.output.delivery.delivered import delivered
 from trajcli.output.delivery.for_consumer import ForConsumer, Writing, _Search, plan_for, refusal, rows_for
@@ -123,6 +124,7 @@ def test_what_a_consumer_brings_is_said_of_rows_that_are_slowed_too() -> None:
     assert re.fullmatch(r"`--set when_over_limit=slow` keeps all limits, with [\d.]+ s", advice), (
         "rows at another rate are not what it takes"
     )
+    assert float(advice.split()[-2]) == pytest.approx(made.duration, rel=1e-5)
 
 
 @pytest.mark.parametrize(("rate", "digits", "chosen"), [(200, "fixed", False), (400, "full", True)])
@@ -221,3 +223,34 @@ def test_what_a_consumer_brings_goes_before_the_job_where_it_is_asked_for_and_be
     place = refused.value.problems[0].place
     assert place is not None
     assert text[place.column - 1 :].startswith("125")
+
+
+def test_a_plan_that_breaks_its_own_limits_is_as_it_is_for_any_consumer() -> None:
+    """Nothing is said of its rows: it is refused for what it does itself."""
+    made = made_for(read({"limits": {"velocity": 0.5}, "moves": SEPTIC}, rate=50), "ros-jtc")
+    assert [finding.kind for finding in made.plan.verdict.findings] == ["velocity"]
+    assert (made.joined, made.rules, made.keeps) == (None, None, False)
+
+
+def test_rows_are_judged_by_rules_whatever_they_do_to_limits() -> None:
+    """The last velocity is not zero: and the curve through few rows passes the limit of the jerk."""
+    job = {"limits": LIMITS, "moves": [*MOVES[:1], {**SLOWLY, "to": {"joints": [2], "velocity": [0.5]}}]}
+    loaded, profile, _ = job_for(read(job, rate=7), "ros-jtc", {"rows": True})
+    made = rows_for(plan_job(loaded), profile, Writing())
+    assert made.joined is not None
+    assert {finding.kind for finding in made.joined.findings if finding.limit is not None} >= {"jerk"}
+    assert made.rules is not None
+    assert [found.rule for found in made.rules.findings if found.severity == "error"]
+    assert {found.rule for found in made.over} >= {
+        found.rule for found in made.rules.findings if found.severity == "error"
+    }
+
+
+def test_what_is_carried_instead_is_carried_in_plans_for_consumers() -> None:
+    hold = {"planner": "hold", "duration": 1}
+    loaded = job_for(
+        read({"robot": "planar2r", "start": {"joints": [0, 0]}, "moves": [hold, hold]}), "ros-jtc", {}
+    )
+    made = plan_for(*loaded, Writing(), lambda index, _: point_mass(3.0 + index))
+    masses = [move.robot.payload.mass for move in made.plan.moves if move.robot.payload is not None]
+    assert masses == [3.0, 4.0]
