@@ -11,6 +11,7 @@ import pytest
 
 import trajcli
 from tests.cli.running import call
+from trajcli.errors import Problem
 
 SLIDE: dict[str, Any] = {
     "version": 1,
@@ -94,6 +95,18 @@ def test_numbers_that_nobody_gives_a_unit_are_kept_on_another_grid(tmp_path: Pat
     for rate in (0, -1, float("nan"), "2"):
         with pytest.raises(trajcli.InputError, match="rate: expected rows per second above 0"):
             trajcli.resample(rows, rate)  # type: ignore[arg-type]
+
+
+def test_a_motion_that_jumps_where_its_file_does_not_is_refused_and_not_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = tmp_path / "rows.csv"
+    rows.write_text("t,q1\n0,0\n1,1\n2,2\n")
+    said = Problem("j1 jumps", joint="j1")
+    monkeypatch.setattr("trajcli.editing.requirements.new_jumps", lambda before, after: [said])
+    with pytest.raises(trajcli.VerificationError, match="j1 jumps"):
+        trajcli.resample(rows, 2, output=tmp_path / "after.csv")
+    assert not (tmp_path / "after.csv").exists()
 
 
 def test_what_is_written_is_what_is_judged(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
