@@ -322,3 +322,10 @@ def test_every_field_is_described(kind: SchemaKind) -> None:
     schema = VALIDATORS[kind].schema
     parts = {"": schema, **schema["$defs"]}
     assert [lack for name, part in parts.items() for lack in _described(part, name)] == []
+
+
+@pytest.mark.parametrize("text", [" 3 s", "\t3s", "3 s "])
+def test_spaces_about_a_number_are_accepted_by_schema_and_reader(text: str) -> None:
+    plain = _with(text, *GOOD["duration"])
+    assert flaws("job", plain) == []
+    assert job_from_text(json.dumps(plain)).job.moves[0].duration == 3

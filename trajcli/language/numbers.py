@@ -237,7 +237,7 @@ def number_schema(quantity: Quantity, **stated: float) -> JsonSchemaValue:
     number = {"type": "number", **bounds, **stated}
     if quantity.dimension == "ratio":
         return number
-    return {"anyOf": [number, {"type": "string", "pattern": "^[-+.0-9]"}]}
+    return {"anyOf": [number, {"type": "string", "pattern": r"^\s*[-+.0-9]"}]}
 
 
 def _least(quantity: Quantity) -> float:
