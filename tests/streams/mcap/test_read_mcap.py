@@ -381,6 +381,13 @@ def test_messages_that_do_not_belong_together_are_refused(tmp_path: Path) -> Non
         assert words in refused(bag(tmp_path / f"{k}.mcap", {"/x": (STATE, messages)}))
 
 
+@pytest.mark.parametrize("other", [{"names": ["a", "b", "çc"]}, {"qd": [1.0, 2, 3]}])
+def test_chunks_that_do_not_belong_together_are_refused(other: dict, tmp_path: Path) -> None:
+    messages = [state(0, [1.0, 2, 3]), state(1, [1.0, 2, 3], **other)]
+    path = bag(tmp_path / "two.mcap", {"/joint_states": (STATE, messages)}, chunk_size=1)
+    assert "are about different joints or quantities" in refused(path)
+
+
 def raw_log(
     path: Path, *, compression: str = "", content: bytes = b"", size: int | None = None, **channel: str
 ) -> Path:

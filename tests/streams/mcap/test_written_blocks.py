@@ -246,3 +246,11 @@ def test_attachments_are_where_the_summary_says_with_their_checksums() -> None:
         assert (said.name, said.media_type) == (file.name, file.media_type)
         assert content[-4 - len(file.data) : -4] == file.data
         assert struct.unpack("<I", content[-4:])[0] == zlib.crc32(content[:-4]) != 0
+
+
+def test_points_of_all_blocks_count_from_the_start_of_the_motion() -> None:
+    made = replace(recording(4.0), topics=("/joint_trajectory_point",))
+    messages, _ = read(written(made, rows_at([0, 1.25]), rows_at([2, 3, 4])))
+    points = [message.data for topic, message in messages if topic == "/joint_trajectory_point"]
+    begun = [struct.unpack("<iI", data[-8:]) for data in points]
+    assert begun == [(0, 0), (1, 250_000_000), (2, 0), (3, 0), (4, 0)]
