@@ -7,11 +7,14 @@ from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from trajcli.errors import Amount, InputError, MissingLimitError, PlanningError, Problem
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.zone import Zone
+from trajcli.planners.flying_by import stretched_chain
+from trajcli.planners.flying_by.within_limits import FlownChain
 from trajcli.planning import flown_job
 from trajcli.planning.flown_job import FlownCorner, FlyBy, chains, flown_corners
 from trajcli.planning.plan import Plan, plan_job
@@ -176,6 +179,12 @@ def test_an_aligned_chain_lasts_the_next_whole_number_of_periods(
     assert flown_job._aligned(SimpleNamespace(duration=duration), 100.0) == pytest.approx(periods / 100.0)  # type: ignore[arg-type]
 
 
+def test_a_chain_that_is_stretched_twice_says_by_what_in_all() -> None:
+    found = FlownChain((), SimpleNamespace(ends=[np.zeros((2, 2))]), (), 1.0, ())  # type: ignore[arg-type]
+    assert found.stretch == 1.0
+    assert stretched_chain(stretched_chain(found, 1.25), 1.5).stretch == 1.875
+
+
 def made(index: int, duration: float) -> Any:
     """Return what counts of a planned move."""
     return SimpleNamespace(index=index, duration=duration, robot=("arm", index))
@@ -328,6 +337,10 @@ def test_a_job_that_is_aligned_flies_by_in_whole_periods() -> None:
     assert periods == pytest.approx(round(periods), abs=1e-9)
     assert 0 <= periods - 100 * free.trajectory.duration < 1
     assert aligned.flyby.searched == pytest.approx(free.flyby.searched, rel=1e-9)
+    longer = [slow.duration / fast.duration for slow, fast in zip(aligned.moves, free.moves, strict=True)]
+    assert min(longer) > 1
+    assert [move.stretch for move in aligned.moves] == pytest.approx(longer, rel=1e-9)
+    assert [move.stretch for move in free.moves] == [1.0, 1.0]
 
 
 @pytest.mark.full

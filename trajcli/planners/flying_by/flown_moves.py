@@ -242,7 +242,7 @@ def moves_as_flown(moves: Sequence[PlannedMove], chain: FlownChain) -> Iterator[
             parts=parts,
         )
         robot = reduce(with_looser_limits, robots[max(number - 1, 0) : number + 2], move.robot)
-        yield replace(move, start=state, robot=robot, planned=planned, stretch=1.0)
+        yield replace(move, start=state, robot=robot, planned=planned, stretch=chain.stretch)
         state = end
 
 
@@ -299,7 +299,7 @@ def stretched_chain(chain: FlownChain, factor: float) -> FlownChain:
         )
         for part in chain.parts
     )
-    return replace(chain, parts=parts)
+    return replace(chain, parts=parts, stretch=chain.stretch * factor)
 
 
 def zone_events(zones: Sequence[FlownZone], names: Sequence[str]) -> Iterator[Event]:

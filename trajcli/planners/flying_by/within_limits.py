@@ -158,6 +158,7 @@ class FlownChain:
         parts: Of the motion: courses and zones in turns.
         model: Duration of the fastest chain that was found, before the pace of any part was lowered, s.
         robots: Of each course, with the limits that its move has to keep: it may be planned within others.
+        stretch: How many times longer it lasts than what was found.
     """
 
     moves: tuple[int, ...]
@@ -165,6 +166,7 @@ class FlownChain:
     parts: tuple[FlownPart, ...]
     model: float
     robots: tuple[Robot, ...]
+    stretch: float = 1.0
 
     @property
     def duration(self) -> float:
