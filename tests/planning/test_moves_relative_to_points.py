@@ -88,15 +88,15 @@ def test_here_is_where_a_move_has_ended_that_names_no_target() -> None:
     "between", [[], [{"planner": "hold", "duration": 1}], [{"signal": "lamp", "value": 1}]]
 )
 def test_angles_are_typed_on_behind_what_moves_nothing(between: list[dict[str, Any]]) -> None:
-    """From 0 to 200 degrees of yaw as they are typed, where the shorter way would be -160."""
+    """From 360 to 200 degrees of yaw as they are typed, where from 0 to 200 is meant otherwise."""
     turn = to({"xyz": [0.4, 0.1, 0.3], "rpy": [np.pi, 0, np.radians(200)]}, "line")
-    pose = {"xyz": [0.4, 0.1, 0.25], "rpy": [np.pi, 0, 0]}
+    pose = {"xyz": [0.4, 0.1, 0.25], "rpy": [np.pi, 0, 2 * np.pi]}
     plan = planned(to(pose), *between, {**turn, "orientation": "euler"}, limits={"acceleration": 20})
     begin, end = (
-        plan.trajectory.curve.evaluate(at)
-        for at in (plan.trajectory.spans[-1].start, plan.trajectory.duration)
+        plan.trajectory.curve.evaluate(span)
+        for span in (plan.trajectory.spans[-1].start, plan.trajectory.duration)
     )
-    assert abs(end - begin)[5] == pytest.approx(np.radians(200), abs=0.3)
+    assert abs(end - begin)[5] == pytest.approx(np.radians(160), abs=0.3)
 
 
 def test_rounds_that_are_the_same_motion_have_numbers_of_their_own() -> None:

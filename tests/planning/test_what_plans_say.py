@@ -309,3 +309,17 @@ def test_what_is_carried_instead_is_asked_for_each_move_with_what_the_job_says()
     assert [None if payload is None else payload.mass for payload in carrying] == [11, 12, 13, 14, 15, 16]
     fastest = [np.degrees(move.robot.limits.velocity[0, 1]) for move in plan.moves[1:]]
     assert fastest == pytest.approx([50, 100] * 3)
+
+
+def test_a_limit_that_a_later_move_loosens_is_named_where_it_stands() -> None:
+    moves = [
+        {"planner": "hold", "duration": 1},
+        {"planner": "hold", "duration": 1, "limits": {"velocity": 9}},
+    ]
+    with pytest.raises(InputError) as caught:
+        planned(*moves, limits={"velocity": 3})
+    (problem, *_) = caught.value.problems
+    assert problem.place is not None
+    text = json.dumps(job_of(*moves, limits={"velocity": 3}))
+    assert problem.move == 1
+    assert text.index('"velocity": 9') - 20 < problem.place.column <= text.index('"velocity": 9') + 15
