@@ -15,11 +15,11 @@ from trajcli.planners import ruckig as planner
 from trajcli.planners.ruckig import (
     BoundaryProblem,
     PhaseProfile,
-    _inside,
     _with_less,
     _within,
     fastest,
     fastest_of,
+    inside,
     together,
 )
 
@@ -161,7 +161,7 @@ def test_what_is_given_up_is_jerk_and_acceleration_where_no_end_needs_it() -> No
 
 def test_only_rounding_is_laid_onto_a_bound() -> None:
     above, far = 1.0 + 4e-13, 1.0 + 1e-11
-    assert [_inside(value, -1.0, 1.0) for value in (0.3, above, far, -above, -far)] == [
+    assert [inside(value, -1.0, 1.0) for value in (0.3, above, far, -above, -far)] == [
         0.3,
         1.0,
         far,
