@@ -9,6 +9,7 @@ import numpy as np
 from yaml_files import read_yaml
 
 import trajcli
+from trajcli.curves.piecewise import PiecewisePolynomial, derivative_coefficients
 
 ORACLES = Path(__file__).parents[2] / "oracles" / "waypoint_lists.yaml"
 LISTS = read_yaml(ORACLES)
@@ -60,7 +61,7 @@ def most_used(plan, case):
     """Return the largest part of a limit that is used anywhere: of all pieces, at their ends and extremes."""
     curve, used = plan.trajectory.curve, 0.0
     for order, name in ((1, "velocity"), (2, "acceleration"), (3, "jerk")):
-        rows = curve.derivative(order)
+        rows = PiecewisePolynomial(curve.breaks, derivative_coefficients(curve.coefficients, order))
         values = [np.abs(part) for part in rows.piece_ends()]
         if rows.degree == 2:  # the vertex of each parabola
             a, b, c = rows.coefficients
