@@ -103,7 +103,7 @@ def pieces():
     t = 0.2 * np.arange(PIECES + 1)
     q, qd, qdd = natural(t, _points()).evaluate_orders(np.asarray(t), (0, 1, 2)).transpose(1, 0, 2)
     required = requirements_of("ur5e", {"acceleration": 9.0}, None, q)
-    return lambda: judge_arrays(t, q, qd, qdd, required), lambda judgement: [float(judgement.rows)]
+    return lambda: judge_arrays(t, q, qd, qdd, *required), lambda judgement: [float(judgement.rows)]
 
 
 def _job_of_pieces() -> str:

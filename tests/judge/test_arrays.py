@@ -12,6 +12,7 @@ from counted_calls import calls_of
 
 import trajcli
 from trajcli.errors import FileError
+from trajcli.judge.file import CheckOptions, check_file
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Limits, Robot, ToolLimits, unlimited
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
@@ -41,6 +42,19 @@ def test_limits_are_given_as_in_a_job_in_si() -> None:
     limits = {"velocity": {"panda_joint1": None}, "position": {"panda_joint1": None}}
     assert trajcli.check(T, fast, robot="panda").verdict == "exceeded"
     assert trajcli.check(T, fast, robot="panda", limits=limits).verdict == "satisfied"
+
+
+def test_limits_that_are_looser_than_those_of_the_robot_are_said_as_of_a_file(tmp_path: Path) -> None:
+    """`trajcli check --strict` does not accept them."""
+    rows = np.column_stack([T, Q])
+    header = ",".join(["t", *(f"q{k}" for k in range(1, Q.shape[1] + 1))])
+    np.savetxt(tmp_path / "rows.csv", rows, delimiter=",", header=header, comments="", fmt="%.9f")
+    options = CheckOptions(robot="panda", limits="{velocity: 99}")
+    of_file = check_file(str(tmp_path / "rows.csv"), options).judgement.events
+    assert ["99 rad/s instead of" in event for event in of_file] == [True] * 7
+    for _ in range(2):
+        assert trajcli.check(T, Q, robot="panda", limits={"velocity": 99}).events == of_file
+    assert trajcli.check(T, Q, robot="panda", limits={"velocity": 0.9}).events == ()
 
 
 def test_bare_joints_have_the_limits_alone() -> None:

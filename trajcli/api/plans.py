@@ -231,7 +231,7 @@ def check(
     """
     from trajcli.judge.arrays import judge_arrays, requirements_of
 
-    return judge_arrays(times, q, qd, qdd, requirements_of(robot, limits, interpolate, q))
+    return judge_arrays(times, q, qd, qdd, *requirements_of(robot, limits, interpolate, q))
 
 
 def load_robot(name: str | Path) -> Arm:

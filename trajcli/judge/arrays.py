@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
+from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Limits, Robot, unlimited
 from trajcli.streams.npy import share_of
 from trajcli.streams.recorded_motion import RecordedMotion, Resolution
+from trajcli.units import Units, amount_text
 
 _NAMES = ("times", "q", "qd", "qdd")
 _ROWS_AND_JOINTS = 2  # dimensions
@@ -28,6 +30,7 @@ def judge_arrays(
     qd: ArrayLike | None,
     qdd: ArrayLike | None,
     requirements: Requirements,
+    events: tuple[str, ...] = (),
 ) -> Judgement:
     """Return the judgement of rows that are arrays.
 
@@ -37,6 +40,7 @@ def judge_arrays(
         qd: Shape (N, n); None where there are none.
         qdd: Shape (N, n); likewise.
         requirements: What they are judged by.
+        events: What was taken for granted for that.
 
     Raises:
         InputError: When shapes do not fit, or something is not a finite number.
@@ -59,7 +63,7 @@ def judge_arrays(
     motion = RecordedMotion(
         t, positions, arrays["qd"], arrays["qdd"], None, None, None, None, resolution, "the motion"
     )
-    return judge_motion(lambda: (motion,), requirements)
+    return replace(judge_motion(lambda: (motion,), requirements), events=events)
 
 
 def _checked(name: str, values: np.ndarray) -> Array:
@@ -84,8 +88,8 @@ def requirements_of(
     limits: Limits | Mapping[str, Any] | None,
     interpolate: str | None,
     q: ArrayLike,
-) -> Requirements:
-    """Return what arrays are judged by; what a name stands for is read once.
+) -> tuple[Requirements, tuple[str, ...]]:
+    """Return what arrays are judged by, and what is taken for granted; what a name stands for is read once.
 
     Args:
         robot: A robot, the name of one, or the path of a file; None for bare joints, as many as q has.
@@ -104,13 +108,12 @@ def requirements_of(
         bare = robot
     else:
         bare = _read(str(robot), _changed(str(robot)))
+    conceded: tuple[str, ...] = ()
     if isinstance(limits, Limits):
-        from dataclasses import replace
-
         bare = replace(bare, limits=limits)
     elif limits is not None:
-        bare = _limited(_Held(bare), _Held(limits, repr(_plain(limits))))
-    return Requirements(bare, interpolate=interpolate, tool=_tool_of(_Held(bare)))
+        bare, conceded = _limited(_Held(bare), _Held(limits, repr(_plain(limits))))
+    return Requirements(bare, interpolate=interpolate, tool=_tool_of(_Held(bare))), conceded
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401
@@ -160,12 +163,14 @@ def _read(name: str, _changed: float) -> Robot:
 
 
 @lru_cache(maxsize=16)
-def _limited(robot: _Held, limits: _Held) -> Robot:
+def _limited(robot: _Held, limits: _Held) -> tuple[Robot, tuple[str, ...]]:
     from trajcli.job.limits_file import with_limits
 
     if not isinstance(limits.value, Mapping):
         raise InputError(f"limits: expected a mapping or Limits, got {type(limits.value).__name__}")
-    return with_limits(robot.value, limits.value)[0]
+    limited, events = with_limits(robot.value, limits.value)
+    say = partial(amount_text, joint_types=limited.joint_types, units=Units())
+    return limited, tuple(event.text(say) for event in events if event.concedes)
 
 
 @lru_cache(maxsize=16)
