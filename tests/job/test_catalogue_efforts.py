@@ -15,6 +15,8 @@ from yaml_files import read_yaml
 
 from trajcli.catalogue.entries import catalogue_names
 from trajcli.dynamics.newton_euler import InverseDynamics
+from trajcli.errors import InputError
+from trajcli.job.read import job_from_text
 from trajcli.job.robot import load_robot, load_sheet
 from trajcli.urdf.joint_properties import LEAST_PLACEHOLDER_EFFORT
 from trajcli.urdf.serial_robot import robot_of_urdf
@@ -56,6 +58,22 @@ def test_a_file_has_all_links_or_none_and_says_where_they_come_from(name: str) -
 @pytest.mark.parametrize("name", catalogue_names())
 def test_no_arm_has_some_links_only(name: str) -> None:
     assert len(load_robot(name).without_inertia) in (0, len(load_robot(name).joints))
+
+
+def test_robots_that_are_advised_for_their_inertias_have_them() -> None:
+    text = """
+        version: 1
+        robot: ur10e
+        limits: {velocity: 1, acceleration: 1, effort: 100}
+        start: {joints: [0, -1, 1, 0, 0, 0]}
+        moves: [{planner: trapezoid, to: {joints: [0.1, -1, 1, 0, 0, 0]}}]
+    """
+    with pytest.raises(InputError, match="ur10e has none behind joints") as caught:
+        job_from_text(text)
+    advised = caught.value.problems[0].hint.rpartition("such as ")[2].split(" or ")  # type: ignore[union-attr]
+    assert len(advised) == 2
+    assert set(advised) <= set(HEAVY)
+    assert job_from_text(text.replace("ur10e", advised[0])).robot.limits.has_effort
 
 
 @pytest.mark.parametrize("name", [*HEAVY, "fr3"])

@@ -25,7 +25,7 @@ from trajcli.units import effort_unit
 _ROUNDING = 1e-12  # relative: a limit that differs by less was meant to be the same, in another unit
 _INERTIA = (
     "give each joint `link: {mass, com, inertia}`, or name a robot that has them: a URDF with inertials, "
-    "or one of `trajcli robots`"
+    "or one of `trajcli robots`, such as ur5e or fr3"
 )
 
 

@@ -313,9 +313,13 @@ def test_start_and_output_name_none_that_is_many(line: str, many: str) -> None:
     with pytest.raises(InputError, match=rf"'{many}' is many \([0-9]\), and no round") as caught:
         job_from_text(f"{head}{line}\n{text}  - call: rest\n")
     (problem,) = caught.value.problems
-    assert problem.hint == "name one of them"
     assert problem.place is not None
     assert problem.place.source == line
+    assert problem.hint is not None
+    advice, _, named = problem.hint.rpartition(" ")
+    assert advice == "name one, such as"
+    key = "start: " if line.startswith("start") else "output: {in: "
+    job_from_text(f"{head}{key}{named}{'}' * key.count('{')}\n{text}  - call: rest\n")
 
 
 POINTS = [

@@ -131,7 +131,7 @@ class _Expansion:
         self._count(moves, ("moves",), frozenset(), ())
         for path in (("start",), ("output", "in")):
             if (node := self._document.node(path)) is not None:
-                self._check_bound(node, path, frozenset(), "name one of them")
+                self._check_bound(node, path, frozenset(), moves=False)
         called = {name for name, _ in self._counted}
         entries = list(self._entries(moves, ("moves",), {}, ""))
         others = {name: self._uncalled(name) for name in self._sequences if name not in called}
@@ -268,12 +268,13 @@ class _Expansion:
             self._counted[key] = counted
         return self._counted[key]
 
-    def _check_bound(self, entry: Node, path: _Path, bound: frozenset[str], hint: str = "") -> None:
+    def _check_bound(self, entry: Node, path: _Path, bound: frozenset[str], *, moves: bool = True) -> None:
         """Refuse a move, or what no round holds, that names one of many where no round says which."""
         for name in self._names.needs_of(entry):
             if name not in bound:
                 message = f"'{name}' is many ({self._names.counts[name]}), and no round says which is meant"
-                hint = hint or f"write the move within `- {{repeat: {name}, moves: [...]}}`"
+                within = f"write the move within `- {{repeat: {name}, moves: [...]}}`"
+                hint = within if moves else f"name one, such as {self._names.first_of(name)}"
                 raise self._names.refused(message, path, hint)
 
     def _not_too_deep(self, depth: int, path: _Path) -> None:

@@ -98,6 +98,10 @@ class ManyNames:
         self._at[name], self._sections[name] = (path, node), "points"
         return name
 
+    def first_of(self, name: str) -> str:
+        """Return the first of the many that a name is."""
+        return str((self._lists[name][0] if name in self._lists else self._grids[name].origin).value)
+
     def waits(self, name: str) -> bool:
         """Return whether a point is relative to where the arm stands, and so differs from move to move."""
         reached = [name, *self._reached(name)]
