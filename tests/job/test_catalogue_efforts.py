@@ -68,7 +68,7 @@ def test_robots_that_are_advised_for_their_inertias_have_them() -> None:
         start: {joints: [0, -1, 1, 0, 0, 0]}
         moves: [{planner: trapezoid, to: {joints: [0.1, -1, 1, 0, 0, 0]}}]
     """
-    with pytest.raises(InputError, match="ur10e has none behind joints") as caught:
+    with pytest.raises(InputError, match="UR10e has none behind joints") as caught:
         job_from_text(text)
     advised = caught.value.problems[0].hint.rpartition("such as ")[2].split(" or ")  # type: ignore[union-attr]
     assert len(advised) == 2
