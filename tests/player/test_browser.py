@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from extras import require_module
+from tiers import few
 
 from docs.player_picture import PICTURE, screenshot, wait_until
 from trajcli.curves.piecewise import derivative_coefficients
@@ -489,8 +490,10 @@ def pixels(png: bytes | Path) -> np.ndarray:
         return np.asarray(image.convert("RGB"), dtype=float)
 
 
-@pytest.mark.parametrize("size", ["phone", "desktop"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("size", "scheme"),
+    few([("phone", "light"), ("desktop", "light"), ("desktop", "dark"), ("phone", "dark")], 2),
+)
 def test_the_arm_and_the_curves_are_drawn(
     view: Callable[..., Any], pick: Path, size: str, scheme: str
 ) -> None:
