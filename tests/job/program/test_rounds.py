@@ -303,6 +303,23 @@ OUTSIDE = [  # what stands in no round: what it names, a name that is many
 ]
 
 
+def test_a_start_in_a_frame_that_is_many_is_given_in_one_of_them() -> None:
+    text = """
+        version: 1
+        robot: ur5e
+        frames: {left: {xyz: [0.4, 0, 0.3]}, right: {xyz: [0.4, 0.1, 0.3]}, work: [left, right]}
+        points: {p: {in: work, xyz: [0, 0, 0.1], rpy: [3.1, 0, 0]}}
+        limits: {velocity: 1}
+        start: p
+        moves: [{repeat: work, moves: [{planner: quintic, to: p, duration: 9}]}]
+    """
+    with pytest.raises(InputError, match=r"'work' is many \(2\), and no round") as caught:
+        job_from_text(text)
+    (problem,) = caught.value.problems
+    assert problem.hint == "give the pose in one of them: {in: left, ...}"
+    job_from_text(text.replace("start: p", "start: {in: left, xyz: [0, 0, 0.1], rpy: [3.1, 0, 0]}"))
+
+
 @pytest.mark.parametrize(("line", "many"), OUTSIDE)
 def test_start_and_output_name_none_that_is_many(line: str, many: str) -> None:
     head = HEAD if line.startswith("output") else HEAD[: HEAD.index("start: ")]

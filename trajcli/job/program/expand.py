@@ -274,7 +274,7 @@ class _Expansion:
             if name not in bound:
                 message = f"'{name}' is many ({self._names.counts[name]}), and no round says which is meant"
                 within = f"write the move within `- {{repeat: {name}, moves: [...]}}`"
-                hint = within if moves else f"name one, such as {self._names.first_of(name)}"
+                hint = within if moves else self._names.advice(name, path)
                 raise self._names.refused(message, path, hint)
 
     def _not_too_deep(self, depth: int, path: _Path) -> None:

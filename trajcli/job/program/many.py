@@ -98,9 +98,12 @@ class ManyNames:
         self._at[name], self._sections[name] = (path, node), "points"
         return name
 
-    def first_of(self, name: str) -> str:
-        """Return the first of the many that a name is."""
-        return str((self._lists[name][0] if name in self._lists else self._grids[name].origin).value)
+    def advice(self, name: str, path: _Path) -> str:
+        """Return what helps where a name at a path, which no move is, is one of many or is given by these."""
+        first = str((self._lists[name][0] if name in self._lists else self._grids[name].origin).value)
+        if path == ("start",) and self._sections[name] == "frames":
+            return f"give the pose in one of them: {{in: {first}, ...}}"
+        return f"name one, such as {first}"
 
     def waits(self, name: str) -> bool:
         """Return whether a point is relative to where the arm stands, and so differs from move to move."""
