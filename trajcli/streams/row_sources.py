@@ -265,24 +265,38 @@ class LoggedRows:
         with source.open() as stream:
             first = next(log_blocks(stream, source.file, topic, field))
         self.joint_names: tuple[str, ...] | None = first.joint_names
-        self._efforts = first.effort.shape[1]
-        self.named, _ = in_columns(source.file, first.times, _states(first))
+        found = _no_number(first, 0)
+        if found is not None:
+            self.notes = (f"efforts are left out: {found}",)
+        self._efforts = 0 if found is not None else first.effort.shape[1]
+        self.named, _ = in_columns(source.file, first.times, self._states(first))
         self.relative = np.zeros(len(self.named.names))
 
     def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
         """Yield the rows of some columns."""
         del fixed  # numbers only
+        efforts, before = len(self.named.names) - self._efforts, 0
         with self._source.open() as stream:
             for block in log_blocks(stream, self._source.file, self._topic, self._field):
-                if block.effort.shape[1] < self._efforts:
-                    raise InputError(f"{self._source.file}: an effort of {block.topic} is not finite")
-                states = (*_states(block)[:3], block.effort[:, : self._efforts])
-                yield in_columns(self._source.file, block.times, states)[1][:, list(taken)]
+                found = _no_number(block, before) if max(taken, default=0) >= efforts else None
+                if found is not None:
+                    hint = "`--columns tau=none` of `check` and `convert` leaves efforts out"
+                    raise InputError(f"{self._source.file}: {found}", hint=hint)
+                before += block.times.size
+                yield in_columns(self._source.file, block.times, self._states(block))[1][:, list(taken)]
+
+    def _states(self, motion: LoggedMotion) -> tuple[Array, Array, Array, Array]:
+        efforts = motion.effort[:, : self._efforts]
+        return motion.position, motion.velocity, motion.acceleration, efforts
 
     def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
         """Return that stamps are whole nanoseconds, and nothing else is rounded."""
         return np.array([EXACT if index else _NANOSECONDS for index in taken], dtype=np.int64)
 
 
-def _states(motion: LoggedMotion) -> tuple[Array, Array, Array, Array]:
-    return motion.position, motion.velocity, motion.acceleration, motion.effort
+def _no_number(motion: LoggedMotion, before: int) -> str | None:
+    """Return which effort of some messages is none, where others stand before them; None where all are."""
+    for row, joint in np.argwhere(~np.isfinite(motion.effort))[:1].tolist():
+        name, value = motion.joint_names[joint], motion.effort[row, joint]
+        return f"the effort of {name} in message {before + row} of {motion.topic} is {value}"
+    return None

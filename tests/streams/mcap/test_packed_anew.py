@@ -13,6 +13,7 @@ from streams.mcap.conftest import read_mcap, write_log
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
 from trajcli.planning.plan import plan_job
+from trajcli.streams.recorded_motion import open_motion
 
 STATES, ACCELERATIONS = "/joint_states", "/joint_accelerations"
 JOB = """
@@ -149,18 +150,42 @@ def test_a_number_that_is_none_is_named_by_its_message_and_joint(log: Path, tmp_
         read_mcap(packed(log, tmp_path / "b.mcap", order, 900))
 
 
-def test_an_effort_that_is_none_leaves_out_those_of_its_block(log: Path, tmp_path: Path) -> None:
-    """Drivers without sensors say so; a state has its numbers all the same."""
+def _without_effort(message: int) -> Callable[[Messages], Messages]:
+    """Return an order in which the last joint has no effort in one message."""
 
     def order(messages: Messages) -> Messages:
         states = of_topics(messages, STATES)
-        topic, time, data = states[0]
-        states[0] = topic, time, data[:-8] + np.float64(np.nan).tobytes()
+        topic, time, data = states[message]
+        states[message] = topic, time, data[:-8] + np.float64(np.nan).tobytes()
         return states + of_topics(messages, ACCELERATIONS)
 
-    found = read_mcap(packed(log, tmp_path / "b.mcap", order, 10**6))
-    assert found.effort.shape == (61, 0)
-    assert found.position.tobytes() == read_mcap(log).position.tobytes()
+    return order
+
+
+@pytest.mark.parametrize("size", [900, 10**6])
+def test_efforts_that_are_none_at_the_start_are_left_out_with_a_note(
+    log: Path, size: int, tmp_path: Path
+) -> None:
+    """Drivers without sensors say so; a state has its numbers all the same."""
+    found = open_motion(packed(log, tmp_path / "b.mcap", _without_effort(0), size))
+    assert (found.rows, found.quantities) == (61, ("q", "qd", "qdd"))
+    assert found.notes == (
+        "efforts are left out: the effort of wrist_3_joint in message 0 of /joint_states is nan",
+    )
+    assert found.whole().tau is None
+    assert found.whole().q.tobytes() == read_mcap(log).position.tobytes()
+
+
+def test_a_later_effort_that_is_none_is_refused_unless_efforts_are_left_out(
+    log: Path, tmp_path: Path
+) -> None:
+    path = packed(log, tmp_path / "b.mcap", _without_effort(40), 900)
+    with pytest.raises(InputError, match="the effort of wrist_3_joint in message 40 of /joint_states is nan"):
+        open_motion(path)
+    found = open_motion(path, columns="tau=none")
+    assert (found.rows, found.quantities) == (61, ("q", "qd", "qdd"))
+    whole = open_motion(log).whole()
+    assert whole.tau is not None and whole.tau.tobytes() == read_mcap(log).effort.tobytes()
 
 
 def test_only_in_a_log_of_ours_a_topic_of_accelerations_is_that(log: Path, tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ class LoggedMotion:
         position: Shape (N, n), or (N, 0) where it is not given, as the others.
         velocity: Likewise.
         acceleration: Likewise.
-        effort: Likewise.
+        effort: Likewise; drivers without sensors of effort say NaN.
     """
 
     file: str
@@ -288,6 +288,4 @@ def _motion(file: str, topic: str, series: JointSeries, clock: _Clock, before: i
                 f"{values[row, joint]}",
                 hint="only finite numbers can be compared",
             )
-    # drivers without sensors of effort say NaN
-    effort = series.effort if np.isfinite(series.effort).all() else series.effort[:, :0]
-    return LoggedMotion(file, topic, series.names, clock.seconds(series.nanoseconds), *parts, effort)
+    return LoggedMotion(file, topic, series.names, clock.seconds(series.nanoseconds), *parts, series.effort)
