@@ -226,6 +226,24 @@ def test_times_of_single_precision_explain_velocities_between_them(*, single: bo
     assert found.verdict == ("within rounding" if single else "exceeded")
 
 
+@pytest.mark.parametrize("rows", [100, 1000])
+@pytest.mark.parametrize("period", [0.008, 1 / 240, 1 / 30, 0.1])
+def test_positions_at_stamps_that_were_multiplied_in_single_precision_keep_their_velocity(
+    period: float, rows: int
+) -> None:
+    """Of k * dt in single precision every multiple is off by its own rounding; the joint stands at v t at each."""
+    t = np.arange(rows, dtype=np.float32) * np.float32(period)
+    for speed, verdict in ((0.9, "satisfied"), (0.9 * (1 + 3e-8), "within rounding"), (0.91, "exceeded")):
+        found = trajcli.check(t, speed * t[:, None].astype(float), limits={"velocity": 0.9})
+        assert (found.verdict, found.period) == (verdict, pytest.approx(period, rel=1e-6))
+
+
+def test_a_row_that_is_missing_at_stamps_in_single_precision_is_told() -> None:
+    t = np.delete(np.arange(200, dtype=np.float32) * np.float32(0.008), 77)
+    found = trajcli.check(t, 0.9 * t[:, None].astype(float), limits={"velocity": 1.0})
+    assert [(each.kind, each.row) for each in found.findings] == [("time", 78)]
+
+
 def test_two_rows_are_a_motion() -> None:
     assert trajcli.check(T[:2], Q[:2], robot="panda").rows == 2
 
