@@ -155,9 +155,10 @@ def test_the_decimals_of_all_blocks_count(tmp_path):
 def test_lists_of_texts_are_left_out_and_lists_of_unknown_numbers_refused(tmp_path):
     (tmp_path / "a.jsonl").write_text('{"t": 0, "q": [0, 0], "names": ["a", "b"], "frame": "base"}\n')
     assert open_motion(tmp_path / "a.jsonl", units="rad").notes[0] == "keys that are not read: names, frame"
-    (tmp_path / "a.jsonl").write_text('{"t": 0, "q": [0, 0], "gains": [1, 2]}\n')
-    with pytest.raises(InputError, match="unexpected list 'gains' of 2 numbers"):
+    (tmp_path / "a.jsonl").write_text('\n{"t": 0, "q": [0, 0], "gains": [1, 2]}\n')
+    with pytest.raises(InputError, match="unexpected list 'gains' of 2 numbers") as caught:
         open_motion(tmp_path / "a.jsonl", units="rad")
+    assert str(caught.value.problems[0].place) == f"{tmp_path / 'a.jsonl'}:2:1"
     (tmp_path / "a.jsonl").write_text("\n \n")
     with pytest.raises(InputError, match="has no rows"):
         open_motion(tmp_path / "a.jsonl", units="rad")

@@ -143,7 +143,7 @@ class JsonRows:
         value = _object(line, file, first)
         self._keys, self._columns, names = value.keys(), dict[str, int | None](), list[str]()
         for key, content in value.items():
-            found = _names_of(key, content, file)
+            found = _names_of(key, content, Place(file, first, 1))
             names += found
             if found:
                 self._columns[key] = _length(content)
@@ -222,7 +222,7 @@ def _length(content: Any) -> int | None:  # noqa: ANN401
     return len(content) if isinstance(content, list) else None
 
 
-def _names_of(key: str, content: Any, file: str) -> list[str]:  # noqa: ANN401
+def _names_of(key: str, content: Any, place: Place) -> list[str]:  # noqa: ANN401
     """Return the names of the columns of a key; none where it holds no numbers and no known name."""
     if not isinstance(content, list):
         named = read_name(key).quantity is not None
@@ -236,7 +236,7 @@ def _names_of(key: str, content: Any, file: str) -> list[str]:  # noqa: ANN401
         return []
     lists = ", ".join([*JOINT_ORDERS, "pose, twist, twistd, path"])
     hint = f"{key} has {', '.join(kinds)}" if kinds else f"lists are {lists}"
-    raise InputError(Problem(f"unexpected list '{key}' of {count} numbers", hint, Place(file, 1, 1)))
+    raise InputError(Problem(f"unexpected list '{key}' of {count} numbers", hint, place))
 
 
 def is_json_object(line: bytes) -> bool:

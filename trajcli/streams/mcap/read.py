@@ -178,8 +178,7 @@ def _same_joints(parts: Iterable[JointSeries], file: str, topic: str) -> Iterato
         first = form if first is None else first
         if form != first:
             raise InputError(f"the messages of {topic} in {file} are about different joints or quantities")
-        if part.nanoseconds.size:
-            yield part
+        yield part
 
 
 def _layouts(log: LogRecords, channel: int, field: str | None) -> _Layout:
