@@ -9,7 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from streams.mcap.conftest import read_mcap
-from streams.mcap.test_read_mcap import STATE, TRAJECTORY, bag, message_record, raw_log, refused, state, trajectory
+from streams.mcap.test_read_mcap import (
+    STATE,
+    TRAJECTORY,
+    bag,
+    message_record,
+    raw_log,
+    refused,
+    state,
+    trajectory,
+)
 
 from trajcli.errors import InputError
 from trajcli.streams.mcap.decode import DamagedMessageError, joint_state_layout, joint_trajectory
