@@ -185,7 +185,8 @@ def test_a_later_effort_that_is_none_is_refused_unless_efforts_are_left_out(
     found = open_motion(path, columns="tau=none")
     assert (found.rows, found.quantities) == (61, ("q", "qd", "qdd"))
     whole = open_motion(log).whole()
-    assert whole.tau is not None and whole.tau.tobytes() == read_mcap(log).effort.tobytes()
+    assert whole.tau is not None
+    assert whole.tau.tobytes() == read_mcap(log).effort.tobytes()
 
 
 def test_only_in_a_log_of_ours_a_topic_of_accelerations_is_that(log: Path, tmp_path: Path) -> None:
