@@ -91,7 +91,7 @@ Q = np.array(
 
 
 def test_poses_are_products_of_matrices_and_their_quaternions_never_jump(arm: ArmInUnits) -> None:
-    stream = poses_of(arm, rows_of(Q))
+    stream = poses_of(arm, rows_of(Q), LimitWatch(arm.robot))
     assert [column.name for column in stream.columns] == ["t", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
     rows = np.vstack(list(stream.blocks))
     assert rows[:, 0].tolist() == [5, 5.5, 6, 6.5, 7, 7.5]
@@ -107,7 +107,7 @@ def test_poses_are_products_of_matrices_and_their_quaternions_never_jump(arm: Ar
 
 @pytest.mark.parametrize("frame", few(["tcp", "base", "world"], 3))
 def test_jacobians_and_measures_are_those_of_differences(frame: str, arm: ArmInUnits) -> None:
-    stream = jacobians_of(arm, rows_of(Q), frame)  # type: ignore[arg-type]
+    stream = jacobians_of(arm, rows_of(Q), frame, LimitWatch(arm.robot))  # type: ignore[arg-type]
     assert [column.name for column in stream.columns[:4]] == [
         "t",
         "manipulability",

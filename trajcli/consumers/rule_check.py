@@ -142,6 +142,18 @@ class RuleCheck(ABC):
         index, joints = np.nonzero(over)
         self._add(rows, index, joints, excess[over], fields)
 
+    def note_row(
+        self,
+        rows: RecordedMotion,
+        index: int,
+        over: NDArray[np.bool_],
+        excess: Array,
+        fields: Callable[[int, int], Mapping[str, Any]],
+    ) -> None:
+        """Add the offences of one row of a block, `over` and `excess` (n,); as `note_rows` does for many."""
+        joints = np.flatnonzero(over)
+        self._add(rows, np.full(joints.size, index), joints, excess[joints], fields)
+
     def note_times(
         self,
         rows: RecordedMotion,
@@ -176,6 +188,21 @@ class RuleCheck(ABC):
     def _parameter(self, name: str) -> Any:  # noqa: ANN401
         given = self.rule.parameters.get(name)
         return self.parameters[name] if given is None else given
+
+
+class OfFirstRow(RuleCheck):
+    """A rule that the first rows decide."""
+
+    _seen = False
+
+    def _take(self, rows: RecordedMotion) -> None:
+        if not self._seen:
+            self._seen = True
+            self._judge(rows)
+
+    @abstractmethod
+    def _judge(self, rows: RecordedMotion) -> None:
+        """Judge the first block."""
 
 
 def when(rows: RecordedMotion, index: int) -> str:

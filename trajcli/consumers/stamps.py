@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from trajcli.consumers.differences import largest_rounding
-from trajcli.consumers.rule_check import RuleCheck, when
+from trajcli.consumers.rule_check import OfFirstRow, RuleCheck, when
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding
 from trajcli.streams.recorded_motion import RecordedMotion
@@ -164,7 +164,7 @@ class LongestTime(RuleCheck):
         yield from (replace(found, value=self._latest) for found in super().findings())
 
 
-class FirstPoint(RuleCheck):
+class FirstPoint(OfFirstRow):
     """The first point against the state in which the arm stands.
 
     A point at t = 0 is where the arm must stand already, within `tolerance`: what becomes of it otherwise
@@ -174,12 +174,7 @@ class FirstPoint(RuleCheck):
 
     parameters: ClassVar[Mapping[str, Any]] = {"tolerance": None, "later": "curve"}
 
-    _seen = False
-
-    def _take(self, rows: RecordedMotion) -> None:
-        if self._seen:
-            return
-        self._seen = True
+    def _judge(self, rows: RecordedMotion) -> None:
         start = self.around.start
         if start is None or start.size != rows.q.shape[1]:
             self.unjudged = "where the arm stands before is not known: give a job, whose start says it"
@@ -202,9 +197,7 @@ class FirstPoint(RuleCheck):
                 "hint": "let the motion begin where the arm stands, or give its first point a later time",
             }
 
-        over, excess = np.zeros_like(rows.q, dtype=bool), np.zeros_like(rows.q)
-        over[0], excess[0] = np.abs(apart) > tolerance, np.abs(apart)
-        self.note_rows(rows, over, excess, fields)
+        self.note_row(rows, 0, np.abs(apart) > tolerance, np.abs(apart), fields)
 
     def _approach(self, rows: RecordedMotion, start: Array) -> None:
         from trajcli.consumers.executed import approach_excesses

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
 from trajcli.consumers.differences import at_period, largest_rounding, rounding_noise
-from trajcli.consumers.rule_check import RuleCheck, when
+from trajcli.consumers.rule_check import OfFirstRow, RuleCheck, when
 from trajcli.curves.piecewise import Array
 from trajcli.streams.recorded_motion import RecordedMotion
 from trajcli.suggest import did_you_mean
@@ -28,22 +27,7 @@ __all__ = [
 _ROUNDING = 1e-9  # relative
 
 
-class _OfFirstRow(RuleCheck):
-    """A rule that the first rows decide."""
-
-    _seen = False
-
-    def _take(self, rows: RecordedMotion) -> None:
-        if not self._seen:
-            self._seen = True
-            self._judge(rows)
-
-    @abstractmethod
-    def _judge(self, rows: RecordedMotion) -> None:
-        """Judge the first block."""
-
-
-class JointNames(_OfFirstRow):
+class JointNames(OfFirstRow):
     """Names of joints that are not empty, unique, and those of the robot, none left out."""
 
     def _judge(self, rows: RecordedMotion) -> None:
@@ -67,7 +51,7 @@ class JointNames(_OfFirstRow):
         self.note(rows, None if rows.message_joints else joint, 0, 1.0, fields)
 
 
-class JointCount(_OfFirstRow):
+class JointCount(OfFirstRow):
     """As many joints as the consumer moves, `count`."""
 
     parameters: ClassVar[Mapping[str, Any]] = {"count": None}
@@ -116,21 +100,20 @@ class LastVelocity(RuleCheck):
         rows, limit = self._last, self.number("limit")
         if rows is None or rows.qd is None:
             return
-        values = rows.qd
-        over = np.zeros_like(values, dtype=bool)
-        over[-1] = np.abs(values[-1]) > limit
+        last = rows.qd[-1]
 
         def fields(index: int, joint: int) -> dict[str, Any]:
+            value = float(last[joint])
             return {
                 "kind": "end",
-                "value": float(values[index, joint]),
+                "value": value,
                 "limit": limit,
-                "message": f"the last velocity of {self.joint_name(rows, joint)} is "
-                f"{float(values[index, joint]):.6g}, {when(rows, index)}; at most {limit:.3g} is accepted",
+                "message": f"the last velocity of {self.joint_name(rows, joint)} is {value:.6g}, "
+                f"{when(rows, index)}; at most {limit:.3g} is accepted",
                 "hint": "end at rest, with a last velocity of exactly 0.0",
             }
 
-        self.note_rows(rows, over, np.abs(values), fields)
+        self.note_row(rows, rows.t.size - 1, np.abs(last) > limit, np.abs(last), fields)
 
 
 class EffortAbsent(RuleCheck):
@@ -244,10 +227,7 @@ class AtRest(RuleCheck):
             return
         index = 0 if self.word("at") == "start" else rows.t.size - 1
         for order, kind, values, allowed, method in self._rates(rows, near, index):
-            over = np.zeros((rows.t.size, rows.q.shape[1]), dtype=bool)
-            over[index] = np.abs(values) > allowed
-            size = np.zeros(over.shape)
-            size[index] = np.abs(values) / np.maximum(allowed, 1e-300)
+            size = np.abs(values) / np.maximum(allowed, 1e-300)
 
             def fields(
                 index: int,
@@ -268,7 +248,7 @@ class AtRest(RuleCheck):
                     f"rad/s{'^2' * (order == 2)}, and is not at rest",
                 }
 
-            self.note_rows(rows, over, size, fields)
+            self.note_row(rows, index, np.abs(values) > allowed, size, fields)
 
     def _rates(
         self, rows: RecordedMotion, near: Array, index: int

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import Literal
 
 import numpy as np
@@ -54,11 +53,6 @@ def invert(pose: Array) -> Array:
     """Return the inverse poses (*batch, 4, 4): R^T and -R^T t."""
     transposed = np.swapaxes(pose[..., :3, :3], -1, -2)
     return build(transposed, -(transposed @ pose[..., :3, 3:])[..., 0])
-
-
-def compose(*poses: Array) -> Array:
-    """Return the product (*batch, 4, 4) of poses from left to right; of none the identity."""
-    return reduce(np.matmul, poses) if poses else np.eye(4)
 
 
 def transform_points(pose: Array, points: ArrayLike) -> Array:

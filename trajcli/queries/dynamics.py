@@ -44,7 +44,7 @@ def dynamics_report(arm: ArmInUnits, q: Array, qd: Array, qdd: Array) -> dict[st
     }
 
 
-def efforts_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None) -> Stream:
+def efforts_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch) -> Stream:
     """Return t, where there is one, and the efforts of the joints for each row of q, qd and qdd.
 
     Velocities and accelerations without any column are zero.
@@ -79,12 +79,11 @@ def _efforts(
     rows: TableBlocks,
     inputs: JointColumns,
     rates: list[JointColumns | None],
-    watch: LimitWatch | None,
+    watch: LimitWatch,
 ) -> Iterator[Array]:
     for block in rows.blocks:
         q = inputs.values(block)
         motion = [np.zeros_like(q) if each is None else each.values(block) for each in rates]
         refuse_far(np.concatenate([q, *motion]), rows.file)
-        if watch is not None:
-            watch.see(q, inputs.factors, inputs.units)
+        watch.see(q, inputs.factors, inputs.units)
         yield np.hstack([inputs.times(block), dynamics.effort(q, *motion)])

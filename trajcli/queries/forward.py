@@ -51,7 +51,7 @@ def refuse_far(values: Array, file: str) -> None:
         raise InputError(f"{file}: {message}", hint="check its exponent and its unit")
 
 
-def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None) -> Stream:
+def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch) -> Stream:
     """Return t, where there is one, and the tcp's pose (x y z qw qx qy qz) for each row of joint values.
 
     Lengths are in the arm's unit, which the names say. The sign of the quaternion is such that it never
@@ -71,22 +71,19 @@ def poses_of(arm: ArmInUnits, rows: TableBlocks, watch: LimitWatch | None = None
     return Stream(columns, _poses(arm, rows, inputs, watch))
 
 
-def _poses(
-    arm: ArmInUnits, rows: TableBlocks, inputs: JointColumns, watch: LimitWatch | None
-) -> Iterator[Array]:
+def _poses(arm: ArmInUnits, rows: TableBlocks, inputs: JointColumns, watch: LimitWatch) -> Iterator[Array]:
     last = None
     found = {column.kind: (i, column.factor) for i, column in enumerate(map(parse_column, rows.names))}
     axes = [found[axis] for axis in "xyz"] if found.keys() >= {*kinds_of("pose")} else []
     for block in rows.blocks:
         q = inputs.values(block)
         refuse_far(q, rows.file)
-        if watch is not None:
-            times = None if inputs.time is None else block[:, inputs.time]
-            watch.see(q, inputs.factors, inputs.units, times, _HALF)
+        times = None if inputs.time is None else block[:, inputs.time]
+        watch.see(q, inputs.factors, inputs.units, times, _HALF)
         poses = forward(arm.robot, q)
         quaternions = without_jumps(quaternion_from_matrix(poses[:, :3, :3]), last)
         last = quaternions[-1]
-        if axes and watch is not None:
+        if axes:
             stated = np.stack([block[:, i] * unit for i, unit in axes], axis=1)
             if watch.frame is not None:
                 stated = stated @ watch.frame[:3, :3].T + watch.frame[:3, 3]
@@ -95,9 +92,7 @@ def _poses(
         yield np.hstack([inputs.times(block), poses[:, :3, 3] / arm.length_factor, quaternions])
 
 
-def jacobians_of(
-    arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame, watch: LimitWatch | None = None
-) -> Stream:
+def jacobians_of(arm: ArmInUnits, rows: TableBlocks, frame: ReferenceFrame, watch: LimitWatch) -> Stream:
     """Return t, where there is one, measures and the Jacobian, row by row, for each row of joint values.
 
     All is in SI: manipulability; inverse_condition, the smallest over the largest singular value of the
@@ -124,13 +119,12 @@ def _jacobians(
     rows: TableBlocks,
     inputs: JointColumns,
     frame: ReferenceFrame,
-    watch: LimitWatch | None,
+    watch: LimitWatch,
 ) -> Iterator[Array]:
     for block in rows.blocks:
         q = inputs.values(block)
         refuse_far(q, rows.file)
-        if watch is not None:
-            watch.see(q, inputs.factors, inputs.units)
+        watch.see(q, inputs.factors, inputs.units)
         measures = dexterity(arm.robot, q)
         entries = jacobian(arm.robot, q, frame).reshape(len(q), -1)
         columns = np.stack([measures.manipulability, 1.0 / measures.condition], axis=1)

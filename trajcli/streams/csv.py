@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.columns import Column, require_finite, whole_number_columns
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
-from trajcli.streams.decimals import DECIMALS, Digits, NotFixedError, encode_fixed, scan_fixed
+from trajcli.streams.decimals import DECIMALS, Digits, FixedLayout, NotFixedError, encode_fixed, scan_fixed
 
 _CHUNK = 1 << 18  # bytes read back at a time
 _HALF_UNIT = 0.5e-9 + 1e-12  # the last decimal's half, and the first of the two roundings
@@ -108,9 +108,6 @@ class _RowsReadBack:
 
     def skip(self, block: Array) -> bool:
         """Return whether the next rows are surely those of `block`; then they are taken."""
-        # whoever writes to standard output does not pay for the import
-        from trajcli.streams.decimals import FixedLayout
-
         if self._stream.tell() == 0:
             self._expect_names()
         if len(self._left) or self._text or len(block) == 0:

@@ -16,6 +16,7 @@ from trajcli.streams.recorded.column_roles import NamedFile, assign_roles, order
 from trajcli.streams.row_sources import (
     EXACT,
     ArrayRows,
+    LoggedRows,
     RowSource,
     TextRows,
     TimedRows,
@@ -134,8 +135,6 @@ def _rows_of_format(
         option = "--topic" if topic is not None else "--field"
         raise InputError(f"{option} is about MCAP, and {source.file} is none", hint=f"leave {option} out")
     if kind == "mcap":
-        from trajcli.streams.row_sources import LoggedRows
-
         return LoggedRows(source, topic, field)
     if kind == "ros":
         return _message(source)
@@ -192,7 +191,7 @@ def format_of_rows(source: ByteSource) -> str:
 
 def is_log(path: str | Path) -> bool:
     """Return whether a file is read as MCAP."""
-    return str(path).lower().endswith(".mcap") or _begins_as_mcap(path)
+    return str(path).lower().endswith(".mcap") or _first_bytes(path, len(_MCAP)) == _MCAP
 
 
 def holds_motion(path: str | Path) -> bool:
@@ -250,23 +249,18 @@ def motion_files(name: str) -> list[str]:
 
 def is_ros_message(path: str | Path) -> bool:
     """Return whether a YAML file is a ROS message with a joint trajectory: a job has no `joint_names`."""
-    if is_special(str(path)):
-        return False
-    try:
-        with Path(path).open("rb") as stream:
-            return _JOINT_NAMES.search(stream.read(_HEAD)) is not None
-    except (OSError, ValueError):
-        return False
+    return _JOINT_NAMES.search(_first_bytes(path, _HEAD)) is not None
 
 
-def _begins_as_mcap(path: str | Path) -> bool:
+def _first_bytes(path: str | Path, count: int) -> bytes:
+    """Return some bytes of a plain file; none of what is no file, or cannot be read."""
     if str(path) == "-" or is_special(str(path)):
-        return False
+        return b""
     try:
         with Path(path).open("rb") as stream:
-            return stream.read(len(_MCAP)) == _MCAP
+            return stream.read(count)
     except (OSError, ValueError):
-        return False
+        return b""
 
 
 def _message(source: ByteSource) -> ArrayRows:

@@ -68,7 +68,8 @@ def test_what_was_not_typed_is_read_nearest(first, last, sequence, frame):
     curve = euler_interpolation(matrices, None, sequence, frame, [None, last])
     np.testing.assert_array_equal(curve.angles[1], last)
     np.testing.assert_allclose(scipys(sequence, frame, curve.angles[0]), matrices[0], rtol=0, atol=1.1e-10)
-    if curve.locked == ():
+    determined = np.sin(first[1]) if sequence[0] == sequence[2] else np.cos(first[1])
+    if abs(determined) > 1e-4:
         assert np.abs(curve.angles[0] - last).max() <= np.abs(first - last).max() + 1e-9
         assert np.abs(curve.angles[0] - last).max() <= np.pi + 1e-9
     assert curve.length == pytest.approx(np.linalg.norm(curve.angles[1] - curve.angles[0]))
@@ -85,13 +86,12 @@ def test_of_typed_angles_whole_turns_are_made():
     ("sequence", "middle"), [("zyz", 0), ("zyz", np.pi), ("xyz", np.pi / 2), ("xyz", -np.pi / 2)]
 )
 @pytest.mark.parametrize("frame", FRAMES)
-def test_at_gimbal_lock_the_first_angle_is_the_neighbours_and_that_is_said(sequence, middle, frame):
+def test_at_gimbal_lock_the_first_angle_is_the_neighbours(sequence, middle, frame):
     matrix, aim = scipys(sequence, frame, [0.3, middle, 0.9]), np.array([0.7, middle, 0.2])
     target = scipys(sequence, frame, aim)
     curve = euler_interpolation(
         np.array([matrix, target]), SegmentProgress.even(1.0), sequence, frame, [None, aim]
     )
-    assert curve.locked == (0,)
     kept = 0 if frame == "current" else 2
     assert curve.angles[0, kept] == aim[kept]
     np.testing.assert_allclose(scipys(sequence, frame, curve.angles[0]), matrix, rtol=0, atol=1e-12)
@@ -151,7 +151,6 @@ def test_each_angle_is_nearest_to_its_neighbours_on_the_side_of_the_last_typed_o
     given_angles[typed] = way[typed] + [2 * np.pi, 0, -4 * np.pi]
     curve = euler_interpolation(scipys("zyz", frame, way), SEGMENTS, "zyz", frame, given_angles)
     np.testing.assert_allclose(curve.angles - way, np.tile([2 * np.pi, 0, -4 * np.pi], (4, 1)), atol=1e-9)
-    assert curve.locked == ()
 
 
 def test_of_several_typed_triples_what_is_between_is_nearest_to_the_one_behind():

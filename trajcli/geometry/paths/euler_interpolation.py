@@ -38,15 +38,12 @@ class EulerInterpolation(OverSegments):
         progress: How far each segment is done.
         sequence: Such as "ZYZ".
         frame: Whether the axes move along.
-        locked: Targets (from 0) at gimbal lock, of whose first and third angle only the sum or difference was
-            determined, so that the split was chosen.
     """
 
     angles: Array
     progress: SegmentProgress
     sequence: str
     frame: Frame = "current"
-    locked: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         check_sequence(self.sequence)
@@ -94,7 +91,7 @@ def euler_interpolation(
 
     Each is read as the triple, with the whole turns, that is nearest to its neighbour's, beginning at the
     last typed one, or at the last of all, nearest to zero. At gimbal lock the first angle (on fixed axes the
-    last) is its neighbour's; `locked` says so.
+    last) is its neighbour's.
 
     Args:
         rotations: Shape (k + 1, 3, 3).
@@ -110,17 +107,14 @@ def euler_interpolation(
     if len(given) != len(rotations):
         raise InputError(f"{len(rotations)} orientations and {len(given)} triples of angles do not fit")
     anchor = max((n for n, row in enumerate(given) if row is not None), default=len(rotations) - 1)
-    locked, angles = [], np.zeros((len(rotations), 3))
+    angles = np.zeros((len(rotations), 3))
     for n in [*range(anchor, -1, -1), *range(anchor + 1, len(rotations))]:
+        aim = np.zeros(3) if n == anchor else angles[n + 1 if n < anchor else n - 1]
         row = given[n]
-        if row is None:
-            aim = np.zeros(3) if n == anchor else angles[n + 1 if n < anchor else n - 1]
-            row, is_locked = nearest_angles(rotations[n], sequence, frame, aim)
-            locked.extend([n] if is_locked else [])
-        angles[n] = row
+        angles[n] = nearest_angles(rotations[n], sequence, frame, aim)[0] if row is None else row
     if progress is None:
         progress = SegmentProgress.even(float(np.linalg.norm(angles[-1] - angles[0])))
-    return EulerInterpolation(angles, progress, sequence, frame, tuple(sorted(locked)))
+    return EulerInterpolation(angles, progress, sequence, frame)
 
 
 def beyond_half_a_turn(typed: Sequence[ArrayLike | None]) -> bool:
