@@ -15,8 +15,7 @@ from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Joint, Robot, unlimited
-from trajcli.planners.course import ToolOfJoints
-from trajcli.planners.tool_constraint import ToolJerkConstraint
+from trajcli.planners.tool_constraint import ToolJerkConstraint, ToolOfJoints
 
 LEVER, TURN = 0.5, 1.2
 STATE: LawState = (

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, read_only
 from trajcli.frozen import frozen
@@ -125,29 +128,25 @@ class RecordedPoses:
         first = int(self.begins_at(start))
         rows = np.arange(first, len(self.positions))
         if self.merge > 0:
-            rows = first + _moved_by(start, self.positions[first:], self.merge)
+            rows = first + _kept(
+                start, self.positions[first:], lambda step: bool(np.linalg.norm(step) > self.merge)
+            )
         turned = None if self.quaternions is None else self.quaternions[rows]
         return RecordedPoses(self.positions[rows], turned, self.file, self.merge)
 
 
-def _moved_by(start: Array, positions: Array, distance: float) -> np.ndarray:
-    """Return the rows that are further than a distance from the last one that was kept, and the last."""
-    kept, before = [], start
-    for row, position in enumerate(positions):
-        if np.linalg.norm(position - before) > distance:
-            kept.append(row)
-            before = position
-    end = len(positions) - 1
-    return np.array(kept if kept[-1:] == [end] else [*kept[:-1], end], dtype=np.intp)
-
-
-def _moved(start: Array, positions: Array, merge: Array) -> np.ndarray:
-    """Return those rows that are further than `merge` from the last one that was kept, and the last row."""
+def _moved(start: Array, positions: Array, merge: Array) -> NDArray[np.intp]:
+    """Return those rows of which a joint is further than `merge` from the last one kept, and the last row."""
     if (np.abs(np.diff(positions, axis=0, prepend=start[None])) > merge).any(axis=1).all():
         return np.arange(len(positions))
+    return _kept(start, positions, lambda step: bool((np.abs(step) > merge).any()))
+
+
+def _kept(start: Array, positions: Array, is_far: Callable[[Array], bool]) -> NDArray[np.intp]:
+    """Return the rows that are far from the last one that was kept, and the last row."""
     kept, before = [], start
     for row, position in enumerate(positions):
-        if (np.abs(position - before) > merge).any():
+        if is_far(position - before):
             kept.append(row)
             before = position
     end = len(positions) - 1

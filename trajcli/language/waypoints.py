@@ -61,13 +61,31 @@ class PointsField(ListOrRecorded):
 
     def from_mapping(self, value: Mapping[str, Any], context: ReadingContext) -> Recorded:
         """Return the points of a file or of a table."""
-        return _recorded(value, context)
+        unknown = [key for key in value if key not in _KEYS]
+        if unknown:
+            raise FlawError(
+                f"unknown key '{unknown[0]}'", unknown[0], AT_KEY, hint=f"the keys are {', '.join(_KEYS)}"
+            )
+        if ("csv" in value) == ("positions" in value):
+            raise FlawError("expected a list of waypoints, {csv: PATH} or {positions: [...]}")
+        points = _from_file(value, context) if "csv" in value else _inline(value, context)
+        with flaws_below("merge"):
+            merge = _MERGE.read(value["merge"], context) if "merge" in value else ()
+        return Recorded(points.positions, points.times, points.file, merge)
 
     def written(
         self, value: Recorded, serialize: core_schema.SerializerFunctionWrapHandler, context: ReadingContext
     ) -> Any:  # noqa: ANN401
-        """Return the points as a table."""
-        return _written(value, context)
+        """Return the points as a table with the SI unit of each joint."""
+        one = PerJoint(0, "")
+        table: dict[str, Any] = {
+            "positions": [one.write(tuple(q), context) for q in value.positions.tolist()]
+        }
+        if value.times is not None:
+            table["times"] = value.times.tolist()
+        if value.merge:
+            table["merge"] = _MERGE.write(value.merge, context)
+        return table
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -94,20 +112,6 @@ class PointsField(ListOrRecorded):
 Through = Annotated[tuple[NamedWaypoint, ...] | Recorded, PointsField()]
 
 
-def _recorded(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
-    unknown = [key for key in value if key not in _KEYS]
-    if unknown:
-        raise FlawError(
-            f"unknown key '{unknown[0]}'", unknown[0], AT_KEY, hint=f"the keys are {', '.join(_KEYS)}"
-        )
-    if ("csv" in value) == ("positions" in value):
-        raise FlawError("expected a list of waypoints, {csv: PATH} or {positions: [...]}")
-    points = _from_file(value, context) if "csv" in value else _inline(value, context)
-    with flaws_below("merge"):
-        merge = _MERGE.read(value["merge"], context) if "merge" in value else ()
-    return Recorded(points.positions, points.times, points.file, merge)
-
-
 def _from_file(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
     path = value["csv"]
     if "times" in value:
@@ -125,11 +129,8 @@ def _inline(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
         raise FlawError(f"expected a list of rows of joint values, got {shown(rows)}", "positions")
     positions, one = [], PerJoint(0, "Position of each joint.")
     for index, row in enumerate(rows):
-        try:
+        with flaws_below("positions", index):
             positions.append(one.read(row, context))
-        except FlawError as error:
-            error.flaws = error.below("positions", index)
-            raise
     if len(counts := {len(row) for row in positions}) > 1:
         raise FlawError(f"expected rows of as many values, got {counts}", "positions")
     if "times" not in value:
@@ -138,14 +139,3 @@ def _inline(value: Mapping[str, Any], context: ReadingContext) -> Recorded:
     if (np.diff(times) <= 0).any():
         raise FlawError("times must increase", "times", int(np.flatnonzero(np.diff(times) <= 0)[0]) + 1)
     return Recorded(np.array(positions), times)
-
-
-def _written(recorded: Recorded, context: ReadingContext) -> dict[str, Any]:
-    """Return recorded points as a table with the SI unit of each joint."""
-    one = PerJoint(0, "")
-    table: dict[str, Any] = {"positions": [one.write(tuple(q), context) for q in recorded.positions.tolist()]}
-    if recorded.times is not None:
-        table["times"] = recorded.times.tolist()
-    if recorded.merge:
-        table["merge"] = _MERGE.write(recorded.merge, context)
-    return table

@@ -14,16 +14,15 @@ from functools import cached_property
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
+from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.third_order.jerk import ThirdOrderConstraint
 from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.frozen import frozen
 from trajcli.kinematics.following.motion import ToolMotion
-from trajcli.kinematics.forward import forward
+from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Limits, Robot, ToolLimits
-from trajcli.kinematics.tool_derivatives import tool_derivatives
 from trajcli.limits.kinds import path_constraints
-from trajcli.planners.tool_constraint import KnownTool, ToolConstraint, ToolJerkConstraint
+from trajcli.planners.tool_constraint import ToolConstraint, ToolJerkConstraint, ToolOfJoints
 
 _SAMPLES = 9  # of a path, its ends included
 _BEND = 0.9  # of an acceleration, or of a jerk, that a bend of the path may take
@@ -114,7 +113,7 @@ class Course(ABC):
 
     @property
     @abstractmethod
-    def tool(self) -> KnownTool:
+    def tool(self) -> ToolPath | ToolOfJoints:
         """The tool along it."""
 
     def tool_rates(self, s: Array) -> Array:
@@ -237,41 +236,6 @@ def _with_tool(tool: Array, tcp: ToolLimits, states: Array, rows: list[Array]) -
     if np.isfinite(tcp.jerk):
         left = [np.minimum(each, float((tcp.jerk / tool[0]).min())) for each in left]
     return [lower, upper, *left]
-
-
-@frozen
-class ToolOfJoints:
-    """Poses of the tool where the joints are known by s.
-
-    Attributes:
-        curve: q(s).
-        robot: The arm.
-    """
-
-    curve: PiecewisePolynomial
-    robot: Robot
-
-    @property
-    def length(self) -> float:
-        """Last s."""
-        return self.curve.end
-
-    @property
-    def poses(self) -> ToolOfJoints:
-        """Itself."""
-        return self
-
-    def evaluate(self, s: Array, side: Side = "right") -> tuple[Array, Array, Array]:
-        """Return the poses (N, 4, 4), and their first and second derivatives by s, (N, 6), at s (N,)."""
-        rows = self.curve.evaluate_orders(s, (0, 1, 2), side=side)
-        found = tool_derivatives(self.robot, [rows[:, order] for order in range(3)])
-        joined = found.reshape(len(s), 2, 6)
-        return forward(self.robot, rows[:, 0]), joined[:, 0], joined[:, 1]
-
-    def derivatives(self, s: Array, side: Side = "right") -> Array:
-        """Return v by s, w by s and their first two derivatives at s (N,), shape (3, 2, N, 3)."""
-        rows = self.curve.evaluate_orders(s, (0, 1, 2, 3), side=side)
-        return tool_derivatives(self.robot, [rows[:, order] for order in range(4)]).transpose(1, 2, 0, 3)
 
 
 @frozen

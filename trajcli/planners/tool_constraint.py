@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
-from trajcli.curves.piecewise import Array, Side, derivative_coefficients, horner
+from trajcli.curves.piecewise import (
+    Array,
+    PiecewisePolynomial,
+    Side,
+    derivative_coefficients,
+    horner,
+)
 from trajcli.curves.third_order.jerk import JerkRows, LawState
 from trajcli.curves.time_optimal.constraints import ConstraintRows
 from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.frozen import frozen
 from trajcli.geometry.rotation import axis_angle_from_matrix
-from trajcli.kinematics.robot import ToolLimits
+from trajcli.kinematics.following.tool_path import SpeedLimits, ToolPath
+from trajcli.kinematics.forward import forward
+from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.kinematics.tool_derivatives import tool_derivatives
 
 _CORNERS = 16  # of the polygon inside the circle of accelerations
 _BETWEEN = 6  # times in a piece at which the limits of the tool are looked at, its ends included
@@ -27,51 +36,39 @@ _BESIDE = 1e-13  # of the length: so far before its end the last sample of an in
 _EVEN = 1e-6  # of the square of the turning: an axis that changes by less stays
 
 
-class KnownTool(Protocol):
-    """Poses of a tool by s."""
+@frozen
+class ToolOfJoints:
+    """Poses of the tool where the joints are known by s.
+
+    Attributes:
+        curve: q(s).
+        robot: The arm.
+    """
+
+    curve: PiecewisePolynomial
+    robot: Robot
 
     @property
     def length(self) -> float:
         """Last s."""
-        ...
+        return self.curve.end
 
     @property
-    def poses(self) -> KnownPoses:
-        """By s."""
-        ...
-
-
-class SteppingSpeeds(Protocol):
-    """Limits of speed and angular speed that step along a path."""
-
-    def at(self, s: Array, side: Side = "right") -> tuple[Array, Array]:
-        """Return both at s (N,), m/s and rad/s, each (N,)."""
-        ...
-
-    def most_between(self, s: Array) -> tuple[Array, Array]:
-        """Return the largest of both between neighbours of s (N,), increasing, each (N - 1,)."""
-        ...
-
-
-class KnownPoses(Protocol):
-    """Poses and their derivatives by s."""
+    def poses(self) -> ToolOfJoints:
+        """Itself."""
+        return self
 
     def evaluate(self, s: Array, side: Side = "right") -> tuple[Array, Array, Array]:
-        """Return X (N, 4, 4), X' and X'' (N, 6) at s (N,)."""
-        ...
-
-
-class TurningTool(Protocol):
-    """Velocities of a tool by s, with their derivatives."""
-
-    @property
-    def length(self) -> float:
-        """Last s."""
-        ...
+        """Return the poses (N, 4, 4), and their first and second derivatives by s, (N, 6), at s (N,)."""
+        rows = self.curve.evaluate_orders(s, (0, 1, 2), side=side)
+        found = tool_derivatives(self.robot, [rows[:, order] for order in range(3)])
+        joined = found.reshape(len(s), 2, 6)
+        return forward(self.robot, rows[:, 0]), joined[:, 0], joined[:, 1]
 
     def derivatives(self, s: Array, side: Side = "right") -> Array:
         """Return v by s, w by s and their first two derivatives at s (N,), shape (3, 2, N, 3)."""
-        ...
+        rows = self.curve.evaluate_orders(s, (0, 1, 2, 3), side=side)
+        return tool_derivatives(self.robot, [rows[:, order] for order in range(4)]).transpose(1, 2, 0, 3)
 
 
 @frozen
@@ -88,9 +85,9 @@ class ToolConstraint:
 
     estimate: ClassVar[float] = 1.0
 
-    path: KnownTool
+    path: ToolPath | ToolOfJoints
     limits: ToolLimits
-    speeds: SteppingSpeeds | None = None
+    speeds: SpeedLimits | None = None
     oblique: bool = False
     deceleration: float = math.inf
 
@@ -108,15 +105,11 @@ class ToolConstraint:
         along 0.6.
         """
         limits = self.limits
-        _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
-        tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
+        first, second, tangent, turning, speed = self._rates(s, side)
         curvature = np.linalg.norm(second[:, :3], axis=1)
         along = self._along(first, second)
         linear = _translation_rows(tangent, along, curvature, limits.acceleration)
         angular = _rotation_rows(first[:, 3:], second[:, 3:], turning, limits.angular_acceleration)
-        highest, most_angular = self._speeds(s, side)
-        with np.errstate(divide="ignore"):
-            speed = np.minimum(highest / tangent, most_angular / turning)
         cap = np.minimum(speed**2, angular[3])
         slowing = [np.full((s.size, 1), each) for each in (-1.0, 0.0, self.deceleration)]
         a, b, c = (np.hstack(each) for each in zip(linear, angular[:3], slowing, strict=True))
@@ -124,15 +117,20 @@ class ToolConstraint:
 
     def largest(self, s: Array, side: Side) -> Array:
         """Return the largest sd^2 at points (p,), by speeds and by the accelerations across the path."""
-        limits = self.limits
+        first, second, _, _, speed = self._rates(s, side)
+        curvature = np.linalg.norm(second[:, :3], axis=1)
+        with np.errstate(divide="ignore"):
+            bend = self.limits.acceleration / _across(self._along(first, second), curvature)
+        return np.asarray(np.minimum(speed**2, bend))
+
+    def _rates(self, s: Array, side: Side) -> tuple[Array, Array, Array, Array, Array]:
+        """Return X' and X'' (N, 6), the sizes of p' and w', and the largest sd by both speeds, each (N,)."""
         _, first, second = self.path.poses.evaluate(np.clip(s, 0.0, self.path.length), side)
         tangent, turning = (np.linalg.norm(first[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
         highest, most_angular = self._speeds(s, side)
         with np.errstate(divide="ignore"):
             speed = np.minimum(highest / tangent, most_angular / turning)
-            curvature = np.linalg.norm(second[:, :3], axis=1)
-            bend = limits.acceleration / _across(self._along(first, second), curvature)
-        return np.asarray(np.minimum(speed**2, bend))
+        return first, second, tangent, turning, speed
 
     def shortest(self, s: Array) -> Array:
         """Return the times, s, that straight ways and turns between points (p,) take at least, (p - 1,)."""
@@ -186,7 +184,7 @@ class ToolJerkConstraint:
 
     curved: ClassVar[bool] = True
 
-    path: TurningTool
+    path: ToolOfJoints
     jerk: tuple[float, float]
 
     def rows(self, state: LawState, side: Side) -> JerkRows:

@@ -162,14 +162,6 @@ def test_of_several_typed_triples_what_is_between_is_nearest_to_the_one_behind()
     np.testing.assert_allclose(curve.angles, angles, atol=1e-9)
 
 
-def test_each_target_at_the_lock_is_named_in_order():
-    angles = np.array([[0.3, 0, 0.2], [0.3, 0.5, 0.2], [0.1, 0, 0.2], [0.4, 0.5, 0.2]])
-    typed = [None, None, None, angles[3]]
-    assert euler_interpolation(
-        scipys("zyz", "current", angles), SEGMENTS, "zyz", "current", typed
-    ).locked == (0, 2)
-
-
 @pytest.mark.parametrize(
     ("typed", "beyond"),
     [

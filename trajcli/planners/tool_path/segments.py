@@ -6,10 +6,10 @@ nothing, and the latter are stopped at.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, GetJsonSchemaHandler, model_validator
@@ -24,7 +24,16 @@ from trajcli.geometry.rotation import matrix_from_quaternion, quaternion_from_ma
 from trajcli.kinematics.following.tool_path import SpeedLimits
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.language.limits import AngularSpeed, ToolSpeed
-from trajcli.language.numbers import AT_KEY, FlawError, Model, Number, ReadingContext, refuse, shown
+from trajcli.language.numbers import (
+    AT_KEY,
+    FlawError,
+    Model,
+    Number,
+    ReadingContext,
+    flaws_below,
+    refuse,
+    shown,
+)
 from trajcli.language.points import ListOrRecorded, NamedTarget
 from trajcli.language.recorded import RecordedPoses
 from trajcli.language.targets import Target
@@ -40,8 +49,6 @@ _MERGE = Number(
     "Poses that are no further than this from the one before are left out (length unit).",
     at_least=0.0,
 )
-
-T = TypeVar("T")
 
 
 class SegmentLaw(Model):
@@ -117,8 +124,31 @@ class SegmentsField(ListOrRecorded):
     recorded = RecordedPoses
 
     def from_mapping(self, value: Mapping[str, Any], context: ReadingContext) -> RecordedPoses:
-        """Return the poses of a file."""
-        return _from_file(value, context)
+        """Return the poses of a file, in world, m."""
+        keys = ("csv", "in", "merge")
+        unknown = [str(key) for key in value if key not in keys]
+        if unknown:
+            from trajcli.suggest import did_you_mean, valid_names
+
+            hint = did_you_mean(unknown[0], keys) or valid_names(keys)
+            raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], AT_KEY, hint=hint)
+        path = value.get("csv")
+        if not isinstance(path, str):
+            raise FlawError(
+                f"expected the path of a file, got {shown(path)}", *(["csv"] if "csv" in value else [])
+            )
+        if context.read_poses is None:
+            raise FlawError("only a job can read a file of poses", "csv", hint="list the segments")
+        with flaws_below("merge"):
+            merge = _MERGE.read(value.get("merge", 0.0), context)
+        poses = replace(context.read_poses(path), merge=merge)
+        if "in" not in value:
+            return poses
+        from trajcli.language.frames import frame_named
+
+        with flaws_below("in"):
+            frame = frame_named(value["in"], context)
+        return _in_frame(poses, frame)
 
     def written(
         self,
@@ -133,40 +163,6 @@ class SegmentsField(ListOrRecorded):
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         return {"anyOf": [handler(schema), _SCHEMA_OF_FILE]}
-
-
-def _from_file(value: Mapping[str, Any], context: ReadingContext) -> RecordedPoses:
-    """Return the poses of a file, in world, m."""
-    keys = ("csv", "in", "merge")
-    unknown = [str(key) for key in value if key not in keys]
-    if unknown:
-        from trajcli.suggest import did_you_mean, valid_names
-
-        hint = did_you_mean(unknown[0], keys) or valid_names(keys)
-        raise FlawError(f"unknown key '{unknown[0]}'", unknown[0], AT_KEY, hint=hint)
-    path = value.get("csv")
-    if not isinstance(path, str):
-        raise FlawError(
-            f"expected the path of a file, got {shown(path)}", *(["csv"] if "csv" in value else [])
-        )
-    if context.read_poses is None:
-        raise FlawError("only a job can read a file of poses", "csv", hint="list the segments")
-    merge = _within("merge", lambda: _MERGE.read(value.get("merge", 0.0), context))
-    poses = replace(context.read_poses(path), merge=merge)
-    if "in" not in value:
-        return poses
-    from trajcli.language.frames import frame_named
-
-    return _in_frame(poses, _within("in", lambda: frame_named(value["in"], context)))
-
-
-def _within(key: str, read: Callable[[], T]) -> T:
-    """Return what is read below a key."""
-    try:
-        return read()
-    except FlawError as error:
-        error.flaws = error.below(key)
-        raise
 
 
 def _in_frame(poses: RecordedPoses, frame: Array) -> RecordedPoses:

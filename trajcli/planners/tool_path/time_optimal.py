@@ -35,7 +35,7 @@ from trajcli.planners.effort_limits import (
 )
 from trajcli.planners.law_events import distance_from_bound, how_found
 from trajcli.planners.planner import LITTLE, Event, Phase, stretched
-from trajcli.planners.tool_constraint import ToolConstraint, ToolJerkConstraint
+from trajcli.planners.tool_constraint import ToolConstraint, ToolJerkConstraint, ToolOfJoints
 from trajcli.planners.tool_path.follow import FollowedPath, JointMotion
 from trajcli.planners.tool_path.law import LawSpec
 
@@ -121,8 +121,6 @@ def jerk_constraints(
     if math.isfinite(along) and first[:, :3].any():
         found.append(LawJerkConstraint(along))
     if np.isfinite(of_tool).any():
-        from trajcli.planners.course import ToolOfJoints
-
         found.append(ToolJerkConstraint(ToolOfJoints(curve, robot), of_tool))
     return tuple(found)
 
