@@ -154,6 +154,21 @@ class Problem:
         return replace(self, message=f"{{{name}}}: {self.message}", amounts={**self.amounts, name: context})
 
 
+def of_joint(
+    name: str,
+    message: str,
+    hint: str | None,
+    amounts: Amounts,
+    *,
+    value: float | None = None,
+    limit: float | None = None,
+    time: float | None = None,
+) -> Problem:
+    """Return a problem of a joint, whose message may name it as `{joint}`; the others are as in `Problem`."""
+    named = {"joint": name, **amounts}
+    return Problem(message, hint, joint=name, time=time, value=value, limit=limit, amounts=named)
+
+
 def said(message: str, amounts: Amounts, say: Callable[[Amount], str] = str) -> str:
     """Return a message with its amounts, which stand in it as `{name}`, as `say` writes them.
 

@@ -19,7 +19,7 @@ from trajcli.dynamics.effort_bound import (
     needed_stretch,
 )
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.errors import Amount, Amounts, Problem
+from trajcli.errors import Amount, Amounts, Problem, of_joint
 from trajcli.findings import Finding, NamedJoints, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
@@ -139,8 +139,7 @@ def gravity_problem(
         time: From the start of the move, s; None where it is not known.
     """
     name, unit = robot.joint_names[joint], effort_unit(robot.joint_types[joint])
-    amounts: Amounts = {
-        "joint": name,
+    amounts = {
         "needed": Amount(needed, unit=unit),
         "limit": Amount(limit, unit=unit),
         "more": Amount(abs(needed) - abs(limit), unit=unit),
@@ -154,7 +153,7 @@ def gravity_problem(
         "{more} more than its effort limit of {limit}"
     )
     hint = "no duration helps: carry less, go another way, or raise the limit"
-    return Problem(message, hint, joint=name, time=time, value=needed, limit=limit, amounts=amounts)
+    return of_joint(name, message, hint, amounts, time=time, value=needed, limit=limit)
 
 
 class EffortFamily(LimitFamily):

@@ -15,7 +15,7 @@ import numpy as np
 
 from trajcli.curves.approach import ApproachUse, approach_uses
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, of_joint
 from trajcli.findings import Finding, NamedJoints, at_time, excess_amounts, joint_amounts
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits, Robot
@@ -123,16 +123,12 @@ class ApproachFamily(LimitFamily):
         limits = robot.limits.approach
         for use in approach_uses(path.breaks, path.coefficients, limits):
             if abs(use.limit) < _NONE < abs(use.velocity):
-                name = robot.joint_names[use.component]
                 message = (
                     "{joint} would move towards its position limit, {distance} from it, where it may not"
                 )
-                amounts: Amounts = {
-                    "joint": name,
-                    "distance": Amount(max(use.distance, 0.0), 0, use.component),
-                }
+                amounts = {"distance": Amount(max(use.distance, 0.0), 0, use.component)}
                 hint = "keep further from the limit: velocity_by_position allows no motion towards it so near"
-                raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+                raise PlanningError(of_joint(robot.joint_names[use.component], message, hint, amounts))
         return (ApproachConstraint(path, limits),)
 
 

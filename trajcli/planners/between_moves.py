@@ -10,7 +10,7 @@ from pydantic import Field
 from pydantic.json_schema import SkipJsonSchema
 
 from trajcli.curves.piecewise import constant
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.kinematics.robot import MountedTool, Payload, Robot
 from trajcli.language.dynamics import NamedTool, PayloadSpec
 from trajcli.language.numbers import FlawError, Model, Number
@@ -114,11 +114,10 @@ class ChangeTool(BetweenMoves):
         """
         if start.velocity.any():
             joint = int(np.abs(start.velocity).argmax())
-            name, velocity = robot.joint_names[joint], Amount(float(start.velocity[joint]), 1, joint)
-            amounts: Amounts = {"joint": name, "velocity": velocity}
+            amounts = {"velocity": Amount(float(start.velocity[joint]), 1, joint)}
             message = "a tool is changed where the arm stands, and {joint} moves with {velocity}"
             hint = "end the move before it at rest: leave `velocity` out of its target"
-            raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+            raise PlanningError(of_joint(robot.joint_names[joint], message, hint, amounts))
         return super().plan(start, robot)
 
 

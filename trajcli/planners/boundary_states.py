@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from trajcli.curves.piecewise import PiecewisePolynomial, constant
-from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem
+from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem, of_joint
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.planners.planner import Planned
 from trajcli.trajectory import State
@@ -41,8 +41,7 @@ def start_in_motion(planner: str, start: State, robot: Robot) -> PlanningError:
     name, quantity, value = robot.joint_names[joint], QUANTITIES[order], float(values[joint])
     message = f"{planner} starts at rest, but the {quantity} of {{joint}} is {{value}} at its start"
     hint = "let the move before end at rest, or use quintic or jerk_limited"
-    amounts: Amounts = {"joint": name, "value": Amount(value, order, joint)}
-    return PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
+    return PlanningError(of_joint(name, message, hint, {"value": Amount(value, order, joint)}, value=value))
 
 
 def unknown_duration(planner: str, quantity: str, joints: Sequence[int], robot: Robot) -> MissingLimitError:

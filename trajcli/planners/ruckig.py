@@ -22,7 +22,7 @@ import numpy as np
 
 from trajcli.curves.phases import PhaseChain, merged_curve
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.frozen import frozen
 from trajcli.planners.planner import Phase
 
@@ -335,8 +335,7 @@ def _accurate(problem: BoundaryProblem, duration: float | None) -> PhaseProfile:
     message = "{joint}: no motion within the velocity, acceleration and jerk limits could be found"
     message += " that lasts {duration}" if duration else ""
     hint = "change the end velocity or acceleration, or the duration, or raise the limits"
-    amounts: Amounts = {"joint": problem.name, "duration": Amount(duration or 0.0)}
-    raise PlanningError(Problem(message, hint, joint=problem.name, amounts=amounts))
+    raise PlanningError(of_joint(problem.name, message, hint, {"duration": Amount(duration or 0.0)}))
 
 
 def _with_margin(problem: BoundaryProblem, part: float) -> BoundaryProblem:

@@ -11,7 +11,7 @@ import numpy as np
 from trajcli.curves.extrema import peaks
 from trajcli.curves.operations import times_at
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.frozen import frozen
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.search import search
@@ -126,13 +126,12 @@ def _none_found(problem: WaypointProblem, names: list[str]) -> PlanningError:
         message = (
             "no motion through the points keeps the position limits: {joint} goes to {value}, beyond {limit}"
         )
-        amounts: Amounts = {
-            "joint": names[joint],
+        amounts = {
             "value": Amount(float(value[joint]), 0, joint),
             "limit": Amount(float(limit[joint]), 0, joint),
         }
         hint = "give other velocities or points, or widen the limit"
-        return PlanningError(Problem(message, hint, joint=names[joint], amounts=amounts))
+        return PlanningError(of_joint(names[joint], message, hint, amounts))
     return PlanningError(
         "no motion through the points was found with the velocities and accelerations that are given",
         hint="leave some of them out, or lower them",

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from trajcli.curves.operations import along_line, times_at
 from trajcli.curves.piecewise import Array
 from trajcli.curves.turning_bound import bounds_along
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.planners.fastest_through_points.problem import WaypointProblem
 from trajcli.planners.fastest_through_points.segment_motion import PointMotion, exact_motion, joined
 from trajcli.planners.fastest_through_points.state_times import shortest_duration
@@ -137,8 +137,7 @@ def _require_along(
     message = (
         f"`straight` keeps to the polyline, but {quantity} {{value}} of {{joint}} at point {point} leaves it"
     )
-    amounts: Amounts = {"joint": names[joint], "value": Amount(float(values[joint]), order, joint)}
-    raise PlanningError(Problem(message, "leave `straight` out", joint=names[joint], amounts=amounts))
+    raise _refused(message, values, joint, order, names)
 
 
 def _moves_at_turn(values: Array, point: int, order: int, names: list[str]) -> PlanningError:
@@ -146,5 +145,9 @@ def _moves_at_turn(values: Array, point: int, order: int, names: list[str]) -> P
     joint = int(np.abs(values).argmax())
     quantity = ("velocity", "acceleration")[order - 1]
     message = f"`straight` stops at point {point}, where the line turns: {{joint}} has {quantity} {{value}}"
-    amounts: Amounts = {"joint": names[joint], "value": Amount(float(values[joint]), order, joint)}
-    return PlanningError(Problem(message, "leave `straight` out", joint=names[joint], amounts=amounts))
+    return _refused(message, values, joint, order, names)
+
+
+def _refused(message: str, values: Array, joint: int, order: int, names: list[str]) -> PlanningError:
+    amounts = {"value": Amount(float(values[joint]), order, joint)}
+    return PlanningError(of_joint(names[joint], message, "leave `straight` out", amounts))

@@ -12,7 +12,7 @@ from pydantic import Field
 from trajcli.curves.braking import braking
 from trajcli.curves.operations import along_line, coast_until, hold_until, merge_breaks
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem, inward
+from trajcli.errors import Amount, Amounts, MissingLimitError, PlanningError, Problem, inward, of_joint
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.targets import MinimumDuration
@@ -372,13 +372,12 @@ def _end_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
         if not low * (1 + _ROUNDING) <= value <= high * (1 + _ROUNDING):
             limit = low if value < 0 else high
             message = f"{{joint}} would end with {QUANTITIES[order]} {{value}}, beyond its limit {{limit}}"
-            amounts: Amounts = {
-                "joint": boundary.name,
+            amounts = {
                 "value": Amount(value, order, joint),
                 "limit": Amount(limit, order, joint, rounded=inward(limit)),
             }
             hint = f"lower the end {QUANTITIES[order]}, or raise the limit"
-            return [Problem(message, hint, joint=boundary.name, value=value, limit=limit, amounts=amounts)]
+            return [of_joint(boundary.name, message, hint, amounts, value=value, limit=limit)]
     begun = boundary.control == "velocity" and boundary.initial[2] * boundary.final[2] > 0
     if begun or not boundary.final[2] or boundary.done:
         return []
@@ -396,15 +395,14 @@ def _approach_problems(boundary: BoundaryProblem, joint: int) -> list[Problem]:
         "{joint} would end with velocity {velocity} and acceleration {acceleration}: within its "
         "jerk limit it must have moved at {before} just before, beyond its velocity limit {limit}"
     )
-    amounts: Amounts = {
-        "joint": boundary.name,
+    amounts = {
         "velocity": Amount(velocity, 1, joint),
         "acceleration": Amount(acceleration, 2, joint),
         "before": Amount(before, 1, joint),
         "limit": Amount(limit, 1, joint, rounded=inward(limit)),
     }
     hint = "lower the end acceleration or velocity, or raise the velocity or jerk limit"
-    return [Problem(message, hint, joint=boundary.name, value=before, limit=limit, amounts=amounts)]
+    return [of_joint(boundary.name, message, hint, amounts, value=before, limit=limit)]
 
 
 def _require_common_law(
@@ -425,13 +423,12 @@ def _require_common_law(
             f"{{joint}} would have to move at {{value}} {when}, beyond its limit {{limit}}"
         )
         value, name = float(beyond * direction[joint]), robot.joint_names[joint]
-        amounts: Amounts = {
-            "joint": name,
+        amounts = {
             "value": Amount(value, 1, joint),
             "limit": Amount(limit, 1, joint, rounded=inward(limit)),
         }
         hint = "say `synchronize: time`"
-        raise PlanningError(Problem(message, hint, joint=name, value=value, limit=limit, amounts=amounts))
+        raise PlanningError(of_joint(name, message, hint, amounts, value=value, limit=limit))
 
 
 def _beyond(state: tuple[float, float, float], sign: int, bounds: Array) -> float:
@@ -443,19 +440,15 @@ def _beyond(state: tuple[float, float, float], sign: int, bounds: Array) -> floa
 
 
 def _leaves_line(value: float, order: int, joint: int, robot: Robot) -> PlanningError:
-    name = robot.joint_names[joint]
     message = "`synchronize: phase` keeps all joints on one straight line, "
     message += f"but {QUANTITIES[order]} {{value}} of {{joint}} leaves it"
-    amounts: Amounts = {"joint": name, "value": Amount(value, order, joint)}
-    return PlanningError(
-        Problem(message, "say `synchronize: time`", joint=name, value=value, amounts=amounts)
-    )
+    name, amounts = robot.joint_names[joint], {"value": Amount(value, order, joint)}
+    return PlanningError(of_joint(name, message, "say `synchronize: time`", amounts, value=value))
 
 
 def _cannot_wait(boundary: BoundaryProblem, arrival: float, duration: float, joint: int) -> PlanningError:
     """Return the error of a joint that arrives first and moves in its end state."""
-    name = boundary.name
     message = "{joint} arrives after {arrival}, moves on, and cannot wait for the others until {duration}"
-    amounts: Amounts = {"joint": name, "arrival": Amount(arrival), "duration": Amount(duration)}
+    amounts = {"arrival": Amount(arrival), "duration": Amount(duration)}
     hint = "say `synchronize: time`, or let it end at rest"
-    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+    return PlanningError(of_joint(boundary.name, message, hint, amounts))

@@ -19,7 +19,7 @@ from trajcli.curves.trapezoid import (
     profile_of_duration,
     profile_of_speed,
 )
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
 from trajcli.language.targets import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
@@ -236,33 +236,29 @@ def _along(displacement: Array, velocity: Array, robot: Robot) -> float:
     off = np.abs(velocity - speed * displacement)
     if off.max() > _OFF * np.abs(velocity).max() + _STILL:
         joint = int(off.argmax())
-        name = robot.joint_names[joint]
         message = "trapezoid moves all joints along one straight line, but {velocity} of {joint} leaves it"
         hint = "say `synchronize: none`, or use jerk_limited or cubic"
-        amounts: Amounts = {"joint": name, "velocity": Amount(float(velocity[joint]), 1, joint)}
-        raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+        amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
+        raise PlanningError(of_joint(robot.joint_names[joint], message, hint, amounts))
     return speed
 
 
 def _cannot_wait(joint: int, arrival: float, duration: float, end: State, robot: Robot) -> PlanningError:
-    name = robot.joint_names[joint]
     message = "{joint} arrives after {arrival} at {velocity} and cannot wait there until {duration}"
-    amounts: Amounts = {
-        "joint": name,
+    amounts = {
         "arrival": Amount(arrival),
         "velocity": Amount(float(end.velocity[joint]), 1, joint),
         "duration": Amount(duration),
     }
     hint = "give the move a `duration`, end it at rest, or use jerk_limited"
-    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+    return PlanningError(of_joint(robot.joint_names[joint], message, hint, amounts))
 
 
 def _infeasible(
     error: InfeasibleProfileError, joint: int, size: float, move: Trapezoid, robot: Robot
 ) -> PlanningError:
     """Return the error in terms of one joint."""
-    name = robot.joint_names[joint]
-    amounts: dict[str, Amount | str] = {"joint": name}
+    amounts = dict[str, Amount]()
     reason = "no_speed" if error.reason == "speed" and not error.low < error.high else error.reason
     if error.reason in ("speed", "acceleration"):
         order = 1 if error.reason == "speed" else 2
@@ -277,7 +273,7 @@ def _infeasible(
         amounts |= {"low": Amount(error.low, rounded="up"), "high": Amount(error.high, rounded="down")}
     elif error.reason in ("too_fast", "too_slow"):
         amounts["needed"] = Amount(error.low * size, 0, joint, rounded="up")
-    return PlanningError(Problem(_message(error, reason), _HINTS[reason], joint=name, amounts=amounts))
+    return PlanningError(of_joint(robot.joint_names[joint], _message(error, reason), _HINTS[reason], amounts))
 
 
 def _message(error: InfeasibleProfileError, reason: str) -> str:

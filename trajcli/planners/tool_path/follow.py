@@ -13,7 +13,7 @@ import numpy as np
 from trajcli.curves.extrema import peaks
 from trajcli.curves.hermite_fit import FitError, fit, most_pieces
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, Problem, of_joint
 from trajcli.frozen import frozen
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.following.follower import (
@@ -100,9 +100,7 @@ class FollowingDiagnosis:
         value, time, limit = (
             (extremes.low, extremes.low_time, low) if below else (extremes.high, extremes.high_time, high)
         )
-        name = self.robot.joint_names[joint]
-        amounts: Amounts = {
-            "joint": name,
+        amounts = {
             "value": Amount(float(value[joint]), 0, joint),
             "limit": Amount(float(limit[joint]), 0, joint),
             "place": self._s(float(time[joint])),
@@ -110,7 +108,7 @@ class FollowingDiagnosis:
         message = "{joint} would be at {value} at s = {place} of the path, its limit is {limit}"
         hint = "start in another configuration, or move the path"
         when = None if self.law is None else float(time[joint])  # without a law it is s
-        raise PlanningError(Problem(message, hint, joint=name, time=when, amounts=amounts))
+        raise PlanningError(of_joint(self.robot.joint_names[joint], message, hint, amounts, time=when))
 
     def _s(self, at: float) -> Amount:
         s = at if self.law is None else float(self.law.evaluate(min(at, self.law.end))[0])
@@ -216,7 +214,6 @@ class FollowingDiagnosis:
         if ratio > _REGULAR and (self.free or allowed is not None):
             return self._regular(at, allowed)
         joint = int(np.abs(rates).argmax())
-        name = self.robot.joint_names[joint]
         unit = "rad" if self.robot.joint_types[joint] == "revolute" else "m"
         per = "s" if self.law is not None else "rad of the path" if self.angular else "m of the path"
         symptom = f"{{joint}} would have to go {abs(float(rates[joint])):.4g} {unit} for each {per}"
@@ -229,8 +226,7 @@ class FollowingDiagnosis:
             f"singular value {ratio:.2g})"
         )
         hint = "move the path, start in another configuration, or use a move in joint space there"
-        amounts: Amounts = {"joint": name, "place": self._s(at)}
-        return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+        return PlanningError(of_joint(self.robot.joint_names[joint], message, hint, {"place": self._s(at)}))
 
     def _regular(self, at: float, allowed: int | None) -> PlanningError:
         message = f"{allowed} pieces do not meet the tolerance on this path, worst around s = {{place}}"

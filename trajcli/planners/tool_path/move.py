@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from trajcli.curves.piecewise import Array
-from trajcli.errors import Amount, Amounts, InputError, PlanningError, Problem
+from trajcli.errors import Amount, InputError, PlanningError, of_joint
 from trajcli.frozen import frozen
 from trajcli.geometry.paths.orientation import (
     AxisAngleOrientation,
@@ -297,15 +297,11 @@ def check_arrival(planned: PlannedPath, end: Array, robot: Robot) -> None:
     """
     if planned.arrival is not None and np.abs(end - planned.arrival).max() > _ARRIVED:
         joint = int(np.abs(end - planned.arrival).argmax())
-        name = robot.joint_names[joint]
         message = "the tool arrives where the target says, but with {joint} at {value} instead of {wanted}"
         hint = "on a path the arm keeps its branch: go there in joint space, or give the target as a pose"
-        amounts: Amounts = {
-            "joint": name,
-            "value": Amount(float(end[joint]), 0, joint),
-            "wanted": Amount(float(planned.arrival[joint]), 0, joint),
-        }
-        raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+        ends = {"value": end, "wanted": planned.arrival}
+        amounts = {key: Amount(float(joints[joint]), 0, joint) for key, joints in ends.items()}
+        raise PlanningError(of_joint(robot.joint_names[joint], message, hint, amounts))
     configuration = planned.configuration
     wanted = {} if configuration is None else configuration.branch_names
     if configuration is not None and configuration.flags is not None:

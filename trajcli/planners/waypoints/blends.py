@@ -15,7 +15,7 @@ from trajcli.curves.parabolic_blends.durations import BlendAccelerationError
 from trajcli.curves.parabolic_blends.fastest import fastest_blends
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.time_allocation import fastest_durations
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, Amounts, PlanningError, of_joint
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import (
@@ -344,5 +344,4 @@ def _too_slow(error: BlendAccelerationError, points: PointTable, robot: Robot) -
     given = Amount(error.acceleration, 2, error.joint)
     least = Amount(error.least, 2, error.joint, rounded="up")
     hint = "raise the acceleration, allow more time, or say `end_blends: centred`"
-    amounts: Amounts = {"joint": name, "given": given, "least": least}
-    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+    return PlanningError(of_joint(name, message, hint, {"given": given, "least": least}))

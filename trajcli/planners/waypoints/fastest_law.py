@@ -16,7 +16,7 @@ from trajcli.curves.third_order.quartic_law import ReversingLawError
 from trajcli.curves.time_optimal.constraints import PathConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion, UnsettledSpeedError, time_optimal
 from trajcli.curves.time_optimal.passes import UnreachableSpeedError
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.kinds import path_constraints
 from trajcli.planners.effort_limits import solved_within_efforts
@@ -151,10 +151,10 @@ def _require_along(across: Array, acceleration: Array, robot: Robot) -> None:
         return
     joint = int(off.argmax())
     name, value = robot.joint_names[joint], float(acceleration[joint])
-    amounts: Amounts = {"joint": name, "acceleration": Amount(value, 2, joint)}
+    amounts = {"acceleration": Amount(value, 2, joint)}
     message = "time_optimal starts along its path, but {acceleration} of {joint} leaves it"
     hint = "let the move before end at rest or without acceleration, or say `jerk: ignore`"
-    raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
+    raise PlanningError(of_joint(name, message, hint, amounts, value=value))
 
 
 def events_of_law(motion: TimeOptimalMotion, robot: Robot, factor: float) -> Iterator[Event]:

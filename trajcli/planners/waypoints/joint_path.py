@@ -15,7 +15,7 @@ from trajcli.curves.piecewise import Array, PiecewisePolynomial, concatenate
 from trajcli.curves.splines.cubic import not_a_knot
 from trajcli.curves.splines.hermite import ShapeError, parabola_velocities
 from trajcli.curves.third_order.curved_paths import BESIDE, rounded_polyline
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, Problem, of_joint
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.planner import Event
@@ -189,11 +189,10 @@ def _along(slope: Array, velocity: Array, robot: Robot) -> float:
     off = np.abs(velocity - speed * slope)
     if off.max() > _OFF * np.abs(velocity).max() or speed < 0:
         joint = int(off.argmax())
-        name = robot.joint_names[joint]
         message = "a polyline is straight at its ends, but {velocity} of {joint} leaves it"
         hint = "use `path: spline`, or let the move before end at rest"
-        amounts: Amounts = {"joint": name, "velocity": Amount(float(velocity[joint]), 1, joint)}
-        raise PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+        amounts = {"velocity": Amount(float(velocity[joint]), 1, joint)}
+        raise PlanningError(of_joint(robot.joint_names[joint], message, hint, amounts))
     return speed
 
 

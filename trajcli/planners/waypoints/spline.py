@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.curves.splines.hermite import ShapeError
 from trajcli.curves.splines.virtual_points import virtual_points
-from trajcli.errors import Amount, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import FieldPath, Flaw, refuse
 from trajcli.language.recorded import Recorded
@@ -223,7 +223,7 @@ class Spline(ThroughPoints):
 def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningError:
     name, joint = robot.joint_names[error.component], error.component
     message = f"{{velocity}} of {{joint}} at the {error.end} point keeps the curve from being monotone"
-    amounts: dict[str, Amount | str] = {"joint": name, "velocity": Amount(error.velocity, 1, joint)}
+    amounts = {"velocity": Amount(error.velocity, 1, joint)}
     if given:
         message += ", {low} to {high} would not"
         amounts |= {
@@ -233,7 +233,7 @@ def _not_monotone(error: ShapeError, robot: Robot, *, given: bool) -> PlanningEr
     hint = "change that velocity, or use another rule than shape_preserving"
     helps = not given and error.velocity * (error.low + error.high) > 0.0  # against the way no time does
     hint += ", or give every waypoint a `time`" if helps else ""
-    return PlanningError(Problem(message, hint, joint=name, amounts=amounts))
+    return PlanningError(of_joint(name, message, hint, amounts))
 
 
 def _virtual(curve: PiecewisePolynomial) -> ViaPoints:

@@ -16,7 +16,7 @@ from trajcli.curves.third_order.parameterization import JerkLimitedMotion
 from trajcli.curves.time_optimal.constraints import JointConstraint
 from trajcli.curves.time_optimal.parameterization import TimeOptimalMotion
 from trajcli.curves.time_optimal.phase_plane import PhasePlane, switching_structure
-from trajcli.errors import Amount, Amounts, PlanningError, Problem
+from trajcli.errors import Amount, PlanningError, Problem, of_joint
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import (
@@ -293,8 +293,8 @@ class TimeOptimal(ThroughPoints):
         )
         hint = "give it a point between in `through`, or use jerk_limited"
         value, name = float(values[joint]), robot.joint_names[joint]
-        amounts: Amounts = {"joint": name, "value": Amount(value, order + 1, joint)}
-        raise PlanningError(Problem(message, hint, joint=name, value=value, amounts=amounts))
+        amounts = {"value": Amount(value, order + 1, joint)}
+        raise PlanningError(of_joint(name, message, hint, amounts, value=value))
 
     def _untimed(self) -> Self:
         """Return the move without the times of a recording: it is to be passed faster."""
