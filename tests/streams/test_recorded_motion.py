@@ -90,11 +90,11 @@ def test_every_dialect_is_read(dialect, separator, tmp_path):
             assert found is None
 
 
-def test_a_column_of_text_is_left_out_with_a_note(tmp_path):
+def test_a_column_of_text_is_left_out(tmp_path):
     text = 'time,joint1,joint2,description\n0,0.1,0.2,start\n1,0.3,0.4,"of, course"\n2,1,2,\n'
     found = open_motion(written(tmp_path, text), units="rad")
     assert found.whole().q.tolist() == [[0.1, 0.2], [0.3, 0.4], [1.0, 2.0]]
-    assert found.notes == ("columns that are not read: description",)
+    assert (found.unread, found.notes) == (("description",), ())
 
 
 ECHO = (

@@ -15,7 +15,6 @@ from trajcli.frozen import frozen
 from trajcli.judge.reconstruction import reconstruct
 from trajcli.kinematics.robot import JointType
 from trajcli.streams.decimals import DECIMALS
-from trajcli.streams.recorded.column_roles import note_of_unread
 from trajcli.streams.recorded_motion import (
     MotionFile,
     RecordedMotion,
@@ -207,5 +206,4 @@ def _whole(file: MotionFile) -> EditedMotion:
             hint="stamps must increase; `trajcli check` lists all that is wrong with the stamps",
         )
     lost = (f"columns that are left out: {', '.join(file.unread)}",) if file.unread else ()
-    others = (note for note in file.notes if note not in note_of_unread(file.unread))
-    return EditedMotion(rows, file.written_columns(), file.format, (*lost, *others))
+    return EditedMotion(rows, file.written_columns(), file.format, (*lost, *file.notes))

@@ -137,9 +137,7 @@ def check_file(
     of_tool, read = _of_tool_columns(opened, options, given, motion, by_time, planned=requirements.planned)
     judgement = replace(judgement, findings=worst_first([*judgement.findings, *of_tool]))
     of_none = [name for name in motion.unread if name not in read and not requirements.planned]
-    unread = note_of_unread(of_none)
-    of_motion = [note for note in motion.notes if note not in note_of_unread(motion.unread)]
-    notes = (*of_motion, *unread, *given.notes, *judgement.notes)
+    notes = (*motion.notes, *note_of_unread(of_none), *given.notes, *judgement.notes)
     if given.loaded is not None and "move" not in motion.quantities and by_time is None:
         notes = (*notes, "no column `move`: limits and paths of single moves are not judged")
     judged = replace(judgement, notes=notes, events=given.events, source=motion.source)

@@ -15,7 +15,7 @@ from trajcli.kinematics.robot import JointType
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
 from trajcli.streams.recorded.column_names import MOVE, read_name
-from trajcli.streams.recorded.column_roles import ColumnRoles, assign_roles, note_of_unread, ordered_joints
+from trajcli.streams.recorded.column_roles import ColumnRoles, assign_roles, ordered_joints
 from trajcli.streams.recorded.column_units import (
     ColumnScales,
     is_own_language,
@@ -125,7 +125,7 @@ class MotionFile:
         resolution: How far its numbers may be rounded.
         rows: How many there are.
         unread: Names of the columns that are not used.
-        notes: Sentences about what was taken for what, and what was left out.
+        notes: Sentences about what was taken for what.
     """
 
     def __init__(
@@ -156,7 +156,7 @@ class MotionFile:
         self.quantities = (*roles.joints, *((MOVE,) if self._move is not None else ()))
         self.unread = roles.unread
         self._message_joints = rows.joint_names if rows.format == "ros" else None
-        self.notes = (*rows.notes, *note_of_unread(roles.unread), *scales.notes)
+        self.notes = (*rows.notes, *scales.notes)
         self._kept: list[Array] | None = []
         self._read_all(scales)
 
