@@ -155,10 +155,7 @@ def test_an_answer_is_followed_by_what_is_to_be_known_of_it() -> None:
         "turns_not_met": ["a", "b"],
         "closure": 2.5e-7,
     }
-    joints = (SimpleNamespace(name="a"), SimpleNamespace(name="b"))
-    arm = SimpleNamespace(
-        robot=SimpleNamespace(name="arm", joints=joints), joint_unit=lambda i: ("deg", "mm")[i]
-    )
+    arm = SimpleNamespace(robot=SimpleNamespace(name="arm"), joint_units=["deg", "mm"])
     solutions = SimpleNamespace(method=SimpleNamespace(name="a table"))
     assert list(_lines(arm, solutions, [answer, {**answer, **more}])) == [  # type: ignore[arg-type]
         "2 answers for arm (deg, mm), by a table:",

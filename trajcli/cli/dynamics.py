@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from trajcli.cli.numbers import matrix_lines, number, table_lines
-from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
-from trajcli.errors import InputError
+from trajcli.cli.outcome import print_remark, print_report, print_rows, refuse_beside_rows
 from trajcli.job.inline import inline_payload
 from trajcli.kinematics.robot import Robot
 from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
@@ -42,14 +41,9 @@ def run_dynamics(options: DynamicsCommand) -> int:
         np.zeros_like(q) if text is None else arm.joint_values([text], name, order)
         for name, text, order in given
     )
-    remark = beyond_two_turns(arm.robot, q[None], [arm.joint_unit(i) for i in range(len(q))])
-    if remark is not None:
-        print_remark(remark)
+    print_remark(beyond_two_turns(arm.robot, q[None], arm.joint_units))
     report = dynamics_report(arm, q, qd, qdd)
-    if options.as_json:
-        print_json(report)
-    else:
-        print_lines(_lines(arm.robot, report))
+    print_report(report, _lines(arm.robot, report), as_json=options.as_json)
     return 0
 
 
@@ -81,15 +75,12 @@ def _stream(arm: ArmInUnits, options: DynamicsCommand) -> int:
     from trajcli.streams.table import open_rows
 
     given = {"--json": options.as_json, "--qd": options.rates, "--qdd": options.accelerations}
-    for name, value in given.items():
-        if value:
-            raise InputError(f"{name} is for one state, rows from standard input become a CSV")
+    refuse_beside_rows(given, "state")
     watch, rows = LimitWatch(arm.robot), open_rows("-")
     columns, blocks = efforts_of(arm, rows, watch)
     missing = left_out(rows)
     print_rows(columns, blocks, options.digits)
     if missing:
         print_remark(f"without columns {' and '.join(missing)}, which count as zero")
-    if watch.remark is not None:
-        print_remark(watch.remark)
+    print_remark(watch.remark)
     return 0

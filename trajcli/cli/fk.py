@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import pose_lines
-from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
+from trajcli.cli.outcome import print_remark, print_report, print_rows, refuse_beside_rows
 from trajcli.errors import InputError
 from trajcli.kinematics.forward import forward, link_poses
 from trajcli.queries.arm import ArmInUnits, LimitWatch, frame_of_rows, job_of_arm, open_arm
@@ -44,12 +44,9 @@ def run_fk(options: FkCommand) -> int:
         report["links"] = [
             {"name": name, **pose_view(pose, arm.units)} for name, pose in zip(names, frames, strict=True)
         ]
-    if options.as_json:
-        print_json(report)
-    else:
-        print_lines(_lines(arm, report, options.frame))
+    print_report(report, _lines(arm, report, options.frame), as_json=options.as_json)
     watch = LimitWatch(arm.robot)
-    watch.see(q[None], arm.joint_factors, [arm.joint_unit(i) for i in range(len(q))])
+    watch.see(q[None], arm.joint_factors, arm.joint_units)
     _remark(arm, watch)
     return 0
 
@@ -65,9 +62,7 @@ def _stream(arm: ArmInUnits, options: FkCommand) -> int:
     from trajcli.queries.forward import poses_of
     from trajcli.streams.table import open_rows
 
-    for name, given in (("--json", options.as_json), ("--links", options.links)):
-        if given:
-            raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
+    refuse_beside_rows({"--json": options.as_json, "--links": options.links}, "configuration")
     watch, job = LimitWatch(arm.robot), job_of_arm(options.robot)
     watch.frame = None if job is None else frame_of_rows(job)
     columns, blocks = poses_of(arm, open_rows("-"), watch)
@@ -86,8 +81,7 @@ def _stream(arm: ArmInUnits, options: FkCommand) -> int:
 
 def _remark(arm: ArmInUnits, watch: LimitWatch, *, rows: bool = False) -> None:
     """Say on standard error that joint values are outside the limits of the robot; their poses stand."""
-    if watch.remark is not None:
-        print_remark(watch.remark)
+    print_remark(watch.remark)
     first = watch.first
     if first is None:
         return

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.linalg import inv
 
 from trajcli.cli.numbers import number, numbers
-from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
+from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows, refuse_beside_rows
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, PlanningError
 from trajcli.job.inline import inline_target
@@ -55,7 +55,7 @@ def run_ik(options: IkCommand) -> int:
 def _remark_on(arm: ArmInUnits, near: Array) -> None:
     """Say on standard error that --near is where the arm cannot be; it counts all the same."""
     watch = LimitWatch(arm.robot)
-    watch.see(near[None], arm.joint_factors, [arm.joint_unit(i) for i in range(len(near))])
+    watch.see(near[None], arm.joint_factors, arm.joint_units)
     if watch.remark is not None:
         print_remark(f"--near: {watch.remark}")
     if watch.first is not None:
@@ -76,14 +76,12 @@ def _check(options: IkCommand) -> None:
         extent = f"from {_FINEST:g} to {_COARSEST:g} (m and rad)"
         message = f"--tolerance must be {extent}, got {options.tolerance:.6g}"
         raise InputError(message, hint="below is rounding, and what misses by more is no answer")
-    given = {"--turns": options.turns, "--json": options.as_json}
-    for name, value in given.items() if words else ():
-        if value:
-            raise InputError(f"{name} is for one pose, rows from standard input become a CSV")
+    if words:
+        refuse_beside_rows({"--turns": options.turns, "--json": options.as_json}, "pose")
 
 
 def _lines(arm: ArmInUnits, solutions: Solutions, reports: Sequence[dict[str, Any]]) -> Iterator[str]:
-    units = dict.fromkeys(arm.joint_unit(i) for i in range(len(arm.robot.joints)))
+    units = dict.fromkeys(arm.joint_units)
     count = f"{len(reports)} answer{'s' * (len(reports) != 1)}"
     yield f"{count} for {arm.robot.name} ({', '.join(units)}), by {solutions.method.name}:"
     for answer in reports:

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import matrix_lines, number, numbers
-from trajcli.cli.outcome import print_json, print_lines, print_remark, print_rows
-from trajcli.errors import InputError
+from trajcli.cli.outcome import print_remark, print_report, print_rows, refuse_beside_rows
 from trajcli.queries.arm import ArmInUnits, LimitWatch, beyond_two_turns, open_arm
 from trajcli.queries.jacobian import jacobian_report
 
@@ -29,14 +28,9 @@ def run_jacobian(options: JacobianCommand) -> int:
         return _stream(arm, options)
     q = arm.joint_values(options.joints)
     qd = None if options.rates is None else arm.joint_values([options.rates], "--qd", 1)
-    remark = beyond_two_turns(arm.robot, q[None], [arm.joint_unit(i) for i in range(len(q))])
-    if remark is not None:
-        print_remark(remark)
+    print_remark(beyond_two_turns(arm.robot, q[None], arm.joint_units))
     report = jacobian_report(arm, q, options.frame, qd)
-    if options.as_json:
-        print_json(report)
-    else:
-        print_lines(_lines(arm, report, options.frame))
+    print_report(report, _lines(arm, report, options.frame), as_json=options.as_json)
     return 0
 
 
@@ -72,12 +66,9 @@ def _stream(arm: ArmInUnits, options: JacobianCommand) -> int:
     from trajcli.queries.forward import jacobians_of
     from trajcli.streams.table import open_rows
 
-    for name, given in (("--json", options.as_json), ("--qd", options.rates is not None)):
-        if given:
-            raise InputError(f"{name} is for one configuration, rows from standard input become a CSV")
+    refuse_beside_rows({"--json": options.as_json, "--qd": options.rates is not None}, "configuration")
     watch = LimitWatch(arm.robot)
     columns, blocks = jacobians_of(arm, open_rows("-"), options.frame, watch)
     print_rows(columns, blocks)
-    if watch.remark is not None:
-        print_remark(watch.remark)
+    print_remark(watch.remark)
     return 0

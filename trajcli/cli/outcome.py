@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from trajcli.cli.progress import columns, is_terminal
@@ -61,6 +61,16 @@ def refuse_two_inputs(sources: Sequence[str]) -> None:
     """
     if sources.count("-") > 1:
         raise InputError("standard input can be read once")
+
+
+def refuse_beside_rows(given: Mapping[str, object], one: str) -> None:
+    """Refuse options that are about one thing, such as a state, beside rows from standard input.
+
+    Raises:
+        InputError: Names the first that is given.
+    """
+    for name in (name for name, value in given.items() if value):
+        raise InputError(f"{name} is for one {one}, rows from standard input become a CSV")
 
 
 def report_error(error: TrajcliError, form: ErrorForm = "text") -> None:
@@ -183,10 +193,25 @@ def print_rows(columns: Sequence[Column], blocks: Iterable[Array], digits: Digit
         write_csv(blocks, columns, out, digits)
 
 
-def print_remark(text: str, *, verdict: bool = False) -> None:
-    """Print a line for people on standard error; one about a verdict has its colour."""
+def print_remark(text: str | None, *, verdict: bool = False) -> None:
+    """Print a line for people on standard error, where there is one; one about a verdict has its colour."""
+    if text is None:
+        return
     line = _line(text, sys.stderr)
     print(_with_verdict(line, sys.stderr) if verdict else line, file=sys.stderr)  # noqa: T201
+
+
+def print_report(report: Any, lines: Iterable[str], *, as_json: bool) -> None:  # noqa: ANN401
+    """Print a report as JSON, or for people in lines.
+
+    Raises:
+        FileError: When standard output cannot be written.
+        BrokenPipeError: When its reader has closed it.
+    """
+    if as_json:
+        print_json(report)
+    else:
+        print_lines(lines)
 
 
 def print_json(value: Any) -> None:  # noqa: ANN401

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import number, numbers, pose_lines
-from trajcli.cli.outcome import print_json, print_lines
+from trajcli.cli.outcome import print_report
 from trajcli.errors import InputError
 from trajcli.geometry.pose import invert
 from trajcli.geometry.rotation import rotation_defect
@@ -44,10 +44,8 @@ def run_pose(options: PoseCommand) -> int:
     if options.to is None:
         _require_target(options)
         report = pose_report(start.pose, units, euler, point)
-        if options.as_json:
-            print_json(report)
-        else:
-            print_lines(_lines(report, units, options, float(rotation_defect(start.pose[:3, :3]))))
+        defect = float(rotation_defect(start.pose[:3, :3]))
+        print_report(report, _lines(report, units, options, defect), as_json=options.as_json)
         return 0
     target = read_end(options.to, units)
     s = parse_fractions("0,0.5,1" if options.s is None else options.s)
@@ -63,13 +61,12 @@ def run_pose(options: PoseCommand) -> int:
         {"s": value, **pose_report(pose, units, euler, point)}
         for value, pose in zip(s.tolist(), poses, strict=True)
     ]
-    if options.as_json:
-        print_json(reports)
-    else:
-        lines: list[str] = []
-        for report in reports:
-            lines += [f"s = {number(report['s'])}", *(f"  {line}" for line in _lines(report, units, options))]
-        print_lines(lines)
+    lines = [
+        line
+        for report in reports
+        for line in (f"s = {number(report['s'])}", *(f"  {one}" for one in _lines(report, units, options)))
+    ]
+    print_report(reports, lines, as_json=options.as_json)
     return 0
 
 

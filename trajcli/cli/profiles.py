@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from trajcli.cli.numbers import table_lines
-from trajcli.cli.outcome import print_json, print_lines
+from trajcli.cli.outcome import print_report
 from trajcli.consumers.judgement import load_profile
 from trajcli.consumers.profile import ConsumerRule, Profile, profile_names
 
@@ -25,11 +25,9 @@ def run_profiles(options: ProfilesCommand) -> int:
     """
     name = options.name
     profiles = [load_profile(each) for each in profile_names()] if name is None else [load_profile(name)]
-    if options.as_json:
-        views = [profile_view(profile) for profile in profiles]
-        print_json(views if name is None else views[0])
-    else:
-        print_lines(_table(profiles) if name is None else _rules(profiles[0]))
+    views = [profile_view(profile) for profile in profiles]
+    lines = _table(profiles) if name is None else _rules(profiles[0])
+    print_report(views if name is None else views[0], lines, as_json=options.as_json)
     return 0
 
 

@@ -70,6 +70,11 @@ class ArmInUnits:
         """Return the unit of a joint's value, or of its time derivative of the given order."""
         return unit_name(self._quantity(joint, order), self.units)
 
+    @property
+    def joint_units(self) -> list[str]:
+        """Units of the joints' values."""
+        return [self.joint_unit(joint) for joint in range(len(self.robot.joints))]
+
     def joint_values(self, words: Sequence[str], name: str = "q", order: int = 0) -> Array:
         """Return values of all joints in SI, shape (n,).
 
