@@ -328,17 +328,10 @@ def _report(
     made: ForConsumer | None,
     rows: tuple[JoinedRows, Judgement] | None,
 ) -> None:
-    from trajcli.output.report import report_of
+    from trajcli.output.delivery.delivered import report_with_rows
 
-    report = report_of(plan, peers=options.reference)
-    if rows is not None:
-        from trajcli.output.delivery.joined import rows_report
-
-        report = report.model_copy(update={"rows": rows_report(*rows)})
-    if made is not None and made.rules is not None:
-        from trajcli.output.consumer import consumer_report
-
-        report = report.model_copy(update={"consumer": consumer_report(plan, made.rules)})
+    rules = None if made is None else made.rules
+    report = report_with_rows(plan, rows, rules, peers=options.reference)
     if options.report is not None:
         write_text(report.model_dump_json(indent=2) + "\n", options.report)
     from trajcli.job.report_parts import in_units

@@ -112,6 +112,11 @@ class LoadedJob:
             return self.robot
         return self.robot.seen_from(self.robot.stand if name == "base" else self.job.frames[name])
 
+    def with_output(self, change: Mapping[str, Any]) -> LoadedJob:
+        """Return the same job with other values of some fields of its output."""
+        output = self.job.output.model_copy(update=change)
+        return replace(self, job=self.job.model_copy(update={"output": output}))
+
     def say(self, amount: Amount) -> str:
         """Return a number of a message in the job's units."""
         return amount_text(amount, self.robot.joint_types, self.units)

@@ -56,11 +56,10 @@ def job_for(loaded: LoadedJob, name: str | None, kept: Mapping[str, bool]) -> tu
         changed |= {"align": True, "times": None}
     if name or "columns" not in given:
         changed["columns"] = wanted.columns
-    other = output.model_copy(update=changed)
     brought = f"{profile.name} takes {profile.rows.words}"
     differs = {key for key in changed if key in given and getattr(output, key) != changed[key]}
     said = f"{brought}: that goes before `output` of the job" if differs - {"consumer"} else ""
-    return replace(loaded, job=loaded.job.model_copy(update={"output": other})), profile, said
+    return loaded.with_output(changed), profile, said
 
 
 def _refuse_other_rows(loaded: LoadedJob, profile: Profile, stays: Mapping[str, bool]) -> None:

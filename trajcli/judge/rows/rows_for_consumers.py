@@ -90,15 +90,14 @@ def consumers_of(
     if ends is None or not _fits(ends, plan):
         return
     job, rate = plan.loaded.job.model_copy(update={"when_over_limit": "slow"}), ends.rate
+    loaded = replace(plan.loaded, job=job)
     profiles = map(load_profile, profile_names())
     for profile in sorted(profiles, key=lambda profile: profile.rows.rate is None):  # few rows have its rate
         if not _takes(profile, ends, len(plan.loaded.robot.joints)):
             continue
-        yield RowsForConsumer(profile.name, replace(plan.loaded, job=job))
+        yield RowsForConsumer(profile.name, loaded)
         if profile.rows.rate is None and rate is not None and rate != job.output.rate:
-            output = job.output.model_copy(update={"rate": rate, "times": None})
-            faster = job.model_copy(update={"output": output})
-            yield RowsForConsumer(profile.name, replace(plan.loaded, job=faster), rate)
+            yield RowsForConsumer(profile.name, loaded.with_output({"rate": rate, "times": None}), rate)
 
 
 def _fits(ends: _Ends, plan: Plan) -> bool:

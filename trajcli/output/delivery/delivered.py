@@ -5,7 +5,7 @@ Files of rows are judged by what their job delivers.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +14,11 @@ from trajcli.job.read import LoadedJob
 from trajcli.planning.plan import Carried, Plan, plan_job
 
 if TYPE_CHECKING:
+    from trajcli.consumers.judgement import ProfileJudgement
     from trajcli.job.report import Report
     from trajcli.judge.file import CheckedFile, CheckOptions
+    from trajcli.judge.judgement import Judgement
+    from trajcli.output.delivery.joined_rows import JoinedRows
     from trajcli.streams.byte_source import ByteSource
     from trajcli.streams.decimals import Digits
     from trajcli.streams.formats import StreamFormat
@@ -78,29 +81,41 @@ def _refuse_events(plan: Plan) -> None:
         raise concession_error(plan)
 
 
+def report_with_rows(
+    plan: Plan,
+    rows: tuple[JoinedRows, Judgement] | None,
+    rules: ProfileJudgement | None,
+    *,
+    peers: bool = False,
+) -> Report:
+    """Return the report of a plan, with those of its rows, joined, and of what they do against rules."""
+    from trajcli.output.consumer import consumer_report
+    from trajcli.output.delivery.joined import rows_report
+    from trajcli.output.report import report_of
+
+    said: dict[str, Any] = {} if rows is None else {"rows": rows_report(*rows)}
+    said |= {} if rules is None else {"consumer": consumer_report(plan, rules)}
+    return report_of(plan, peers=peers).model_copy(update=said)
+
+
 def report_as_delivered(plan: Plan) -> Report:
     """Return the report of a plan, with that of its rows as CSV, as `trajcli plan --report` writes it."""
-    from trajcli.output.delivery.joined import joined_rows, rows_report, with_event
-    from trajcli.output.report import report_of
+    from trajcli.output.delivery.joined import joined_rows, with_event
     from trajcli.output.write import grid_of
     from trajcli.streams.formats import DEFAULT
 
     if not plan.verdict.passed:
-        return report_of(plan)
+        return report_with_rows(plan, None, None)
     consumer = plan.loaded.job.output.consumer
     if consumer is None:
         rows = joined_rows(plan, grid_of(plan), DEFAULT)
         plan, judged = with_event(plan, rows, DEFAULT)
-        said = {} if judged is None else {"rows": rows_report(rows, judged)}
-        return report_of(plan).model_copy(update=said)
+        return report_with_rows(plan, None if judged is None else (rows, judged), None)
     from trajcli.consumers.judgement import load_profile
-    from trajcli.output.consumer import consumer_report
     from trajcli.output.delivery.for_consumer import Writing, rows_for
 
     made = rows_for(plan, load_profile(consumer), Writing(DEFAULT))
-    said = {} if made.joined is None else {"rows": rows_report(made.rows, made.joined)}
-    rules = {} if made.rules is None else {"consumer": consumer_report(plan, made.rules)}
-    return report_of(plan).model_copy(update={**said, **rules})
+    return report_with_rows(plan, None if made.joined is None else (made.rows, made.joined), made.rules)
 
 
 def plan_of(loaded: LoadedJob, profile: str | None = None, carried: Carried | None = None) -> Plan:

@@ -258,12 +258,10 @@ class _Search:
 
     def other_rows(self, made: ForConsumer) -> tuple[ForConsumer, Mapping[str, Any]] | None:
         """Return the motion with other rows that the consumer takes and that keep all, and what changes."""
-        output, loaded = made.plan.loaded.job.output, made.plan.loaded
         for other in rows_that_keep(made.rows, self._writing.form):
             if self._profile.rows.rate is not None and {*other.output} != {"columns"}:
                 continue
-            job = loaded.job.model_copy(update={"output": output.model_copy(update=other.output)})
-            found = self.judged(replace(made.plan, loaded=replace(loaded, job=job)))
+            found = self.judged(replace(made.plan, loaded=made.plan.loaded.with_output(other.output)))
             if found.clean:
                 words = " and ".join(
                     f"columns {', '.join(value)}"
@@ -345,11 +343,11 @@ class _Search:
             columns.append({"columns": self._profile.rows.columns[:3]})
         if self._profile.rows.rate is None and has_knots(first.plan.trajectory):
             for change in columns:
-                yield self._with_output({"rows": "knots", "times": None, **change}), self._begun
+                yield self._loaded.with_output({"rows": "knots", "times": None, **change}), self._begun
         if isinstance(first.grid, UniformGrid) and form.content != "knots":
             for change in columns:
                 yield (
-                    self._with_output({"align": True, **change}),
+                    self._loaded.with_output({"align": True, **change}),
                     replace(self._begun, period=1 / first.grid.rate),
                 )
 
@@ -371,17 +369,13 @@ class _Search:
             report_progress(f"planning for {self._profile.name}, {periods} periods longer")
             with suppress(TrajcliError):
                 made = self.attempt(
-                    self._with_output({"align": True}), replace(self._begun, stretches=stretches)
+                    self._loaded.with_output({"align": True}), replace(self._begun, stretches=stretches)
                 )
                 if made.duration >= longest:
                     return None
                 if made.clean:
                     return made
         return None
-
-    def _with_output(self, change: Mapping[str, Any]) -> LoadedJob:
-        output = self._loaded.job.output.model_copy(update=change)
-        return replace(self._loaded, job=self._loaded.job.model_copy(update={"output": output}))
 
     def _tightened(
         self, loaded: LoadedJob, adapted: Adaptation, longest: float, *, stretched: bool = False

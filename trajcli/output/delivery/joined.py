@@ -166,10 +166,7 @@ def rows_that_keep(rows: JoinedRows, form: StreamFormat | None = None) -> Iterat
 
 def _other(rows: JoinedRows, form: StreamFormat | None, output: Mapping[str, Any]) -> OtherRows:
     """Return the rows of the same motion where a job says so of its output."""
-    loaded = rows.plan.loaded
-    said = loaded.job.output.model_copy(update=output)
-    job = loaded.job.model_copy(update={"output": said})
-    plan = replace(rows.plan, loaded=replace(loaded, job=job))
+    plan = replace(rows.plan, loaded=rows.plan.loaded.with_output(output))
     made = joined_rows(plan, grid_of(plan), form or DEFAULT)
     return OtherRows(replace(rows, grid=made.grid, groups=made.groups), output)
 
