@@ -221,7 +221,7 @@ def test_what_a_zone_concedes_is_said(
     assert made.flyby is not None
     zone = made.flyby.zones[1]
     changed = replace(zone, asked=0.02, used=0.02 * share, shares=shares)
-    events = list(zone_events([changed], ["j1", "j2"]))
+    events = list(zone_events([changed]))
     assert [event.kind for event in events] == kinds
     assert [event.move for event in events] == [zone.move] * len(kinds)
     if "lowered" in kinds:

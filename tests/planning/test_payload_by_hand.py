@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from tiers import few
 from trajcli.cli.job_commands import PayloadCommand
 from trajcli.cli.payload import run_payload
 from trajcli.dynamics.newton_euler import InverseDynamics
-from trajcli.errors import InputError, TrajcliError, VerificationError
+from trajcli.errors import InputError, PlanningError, Problem, TrajcliError, VerificationError
 from trajcli.job.read import LoadedJob, job_from_text
 from trajcli.kinematics.robot import Payload, point_mass
 from trajcli.planning.payload_capacity import Carried, PayloadCapacity, payload_capacity
@@ -65,6 +65,12 @@ def test_a_counterweight_without_which_nothing_verifies() -> None:
     assert own[1] > 3
     assert found.mass == pytest.approx((-40 - own[1]) / each[1], rel=2e-6)
     assert (found.joint, found.limit) == ("b", -40)
+
+
+def test_tons_are_found_as_kilograms_are() -> None:
+    found = held((0, 0), "{a: 90000, b: 90000}", "")
+    own, each = torques((0, 0), (0, 0))
+    assert found.mass == pytest.approx((90000 - own[0]) / each[0], rel=2e-6)
 
 
 def test_more_than_any_arm_carries_is_any_mass() -> None:
@@ -124,6 +130,92 @@ def test_of_several_payloads_the_one_that_is_meant() -> None:
     second = "  - {planner: hold, duration: 1}\n"
     (one,) = held((0, 20), "{a: 90, b: 30}", second, 0).moves
     assert one == 0
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_each_of_several_payloads_counts_where_it_is_carried(order: tuple[int, int]) -> None:
+    """The one that is further out binds, whether it is the first or the second."""
+    bounds, coms = np.array([90, 30]), ((0.3, 0.1), (0.0, 0.0))
+    text = HEAD + "limits: {effort: {a: 90, b: 30}}\nstart: {joints: [0, 20]}\nmoves:\n"
+    for k in order:
+        com = [1e3 * x for x in (*coms[k], 0.0)]
+        text += f"  - {{attach: {{mass: 1, com: {com}}}}}\n  - {{planner: hold, duration: 1}}\n  - {{detach: {{}}}}\n"
+    own, each = torques((0, 20), coms[0])
+    found = payload_capacity(job_from_text(text))
+    assert found.mass == pytest.approx(((bounds - own) / each).min(), rel=2e-6)
+    assert found.move == (1, 4)[order[1] == 0]
+
+
+def _failing_above(
+    largest: float, problem: Problem | LoadedJob
+) -> Callable[[LoadedJob, Callable[..., Payload | None]], Plan]:
+    """Return a planner that raises a problem, or plans another job, with more than a mass."""
+
+    def planned(loaded: LoadedJob, carried: Callable[..., Payload | None]) -> Plan:
+        if (carried(1, None) or point_mass(0.0)).mass <= largest:
+            return plan_job(loaded, carried, advise=False)
+        if isinstance(problem, Problem):
+            raise PlanningError(problem)
+        return plan_job(problem, carried, advise=False)
+
+    return planned
+
+
+HORIZONTAL = (
+    HEAD.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
+    + "limits: {effort: 9000}\nstart: {joints: [0, 0]}\nmoves:\n  - {planner: hold, duration: 0.2}\n"
+    + "  - {planner: quintic, to: {joints: [20, 40]}, duration: 1.5}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "time", "shown"),
+    [
+        (None, 2.5, ("b", 2.5, -41.0, -40.0)),
+        ("effort", 2.5, ("b", 2.5, -41.0, -40.0)),
+        ("velocity", 2.5, (None, 2.5, None, None)),
+        ("velocity", None, (None, None, None, None)),
+    ],
+)
+def test_what_a_refusal_says_of_an_effort_is_told(
+    kind: str | None, time: float | None, shown: tuple[object, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And of anything else its place and its words alone: 41 deg/s are no torque."""
+    monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 0.1)
+    problem = Problem("it slips", joint="b", move=1, time=time, value=-41.0, limit=-40.0, kind=kind)
+    found = payload_capacity(job_from_text(HORIZONTAL), planned=_failing_above(2.0, problem))
+    assert found.mass == pytest.approx(2.0, rel=0.1)
+    assert (found.joint, found.time, found.effort, found.limit) == shown
+    assert (found.move, found.cause) == (1, "it slips")
+
+
+@pytest.mark.parametrize("value", [-41.0, 31.0])
+def test_where_a_refusal_has_no_time_it_is_that_of_the_largest_effort_with_the_mass(
+    value: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the joint, in the move and in the direction that are named."""
+    monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 0.1)
+    problem = Problem("it slips", joint="b", move=1, value=value, limit=value * 0.99)
+    found = payload_capacity(job_from_text(HORIZONTAL), planned=_failing_above(2.0, problem))
+    plan = plan_job(job_from_text(HORIZONTAL))
+    times = np.linspace(0.2, 1.7, 3001)
+    carrying = InverseDynamics(replace(plan.loaded.robot, payload=point_mass(float(found.mass or 0))))
+    efforts = carrying.effort(*(plan.trajectory(times, order) for order in range(3)))[:, 1]
+    peak = times[efforts.argmax() if value > 0 else efforts.argmin()]
+    assert found.time == pytest.approx(peak, abs=1e-3)
+
+
+def test_what_is_no_effort_has_no_joint_that_needs_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With more than two kilograms this job is too fast."""
+    monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 0.1)
+    faster = job_from_text(HORIZONTAL.replace("duration: 1.5}", "duration: 0.6}"))
+    found = payload_capacity(job_from_text(HORIZONTAL), planned=_failing_above(2.0, faster))
+    worst = max(plan_job(faster).verdict.findings, key=lambda each: each.excess)
+    assert (worst.kind, worst.move) == ("acceleration", 1)
+    assert (found.joint, found.effort, found.limit) == (None, None, None)
+    assert found.cause is not None
+    assert "acceleration" in found.cause
+    assert (found.move, found.time) == (1, worst.time)
 
 
 @pytest.mark.full
@@ -208,6 +300,8 @@ def test_a_job_that_does_not_verify_empty_says_where(move: int) -> None:
     (problem,) = refused.value.problems
     (worst,) = [each for each in plan_job(job_from_text(text)).verdict.findings[:1] if each.move == move]
     assert (problem.move, problem.joint, problem.time) == (move, worst.joint, worst.time)
+    assert worst.hint is not None
+    assert problem.hint == worst.hint
     assert problem.place is not None
     assert (problem.place.file, problem.place.line) == ("job.yaml", row + 1)
 

@@ -221,7 +221,12 @@ def test_an_arm_in_the_horizontal_that_rests_carries_anything(monkeypatch: pytes
 
 @pytest.mark.parametrize(
     ("second", "where"),
-    [("60", "at [60, 0, 0] mm of the tcp"), ("50", "at the centres of mass that the job says")],
+    [
+        ("[60, 0, 0]", "at [60, 0, 0] mm of the tcp"),
+        ("[50, 0, 0]", "at the centres of mass that the job says"),
+        ("[60, 5, 0]", "at the centres of mass that the job says"),
+        ("[60, 0, 5]", "at the centres of mass that the job says"),
+    ],
 )
 def test_a_place_is_named_where_all_is_carried_there(
     second: str,
@@ -233,7 +238,8 @@ def test_a_place_is_named_where_all_is_carried_there(
     monkeypatch.setattr("trajcli.planning.payload_capacity.LARGEST", 1e3)
     text = EMPTY.replace("gravity: [0, -9.81, 0]", "gravity: [0, 0, -9.81]")
     attached = [
-        f"{{attach: {{mass: 1, com: [{x}, 0, 0]}}}}, {{planner: hold, duration: 1}}" for x in ("60", second)
+        f"{{attach: {{mass: 1, com: {com}}}}}, {{planner: hold, duration: 1}}"
+        for com in ("[60, 0, 0]", second)
     ]
     moves = ", {detach: {}}, ".join(attached)
     (tmp_path / "job.yaml").write_text(text[: text.index("moves:")] + f"moves: [{moves}]\n")

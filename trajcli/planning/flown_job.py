@@ -122,7 +122,7 @@ def _fly(
             continue
         begun = math.fsum(move.duration for move in result[:first])
         of_chain = [zone.shifted(begun, len(zones)) for zone in flown_zones(chain)]
-        events += zone_events(of_chain, loaded.robot.joint_names)
+        events += zone_events(of_chain)
         result[first : first + len(some)] = moves_as_flown(some, chain)
         zones += of_chain
         saved += chain.duration - chain.model

@@ -285,6 +285,7 @@ def test_the_acceleration_of_a_fastest_law_is_along_the_seam():
         ({}, {"side": [0.0, 1.0, 0.0]}, "`side` is along it"),
         ({"to": {"xyz": [0.4, -0.1, 0.4]}}, {}, "the z axis of the tool is along it"),
         ({"to": {"xyz": HERE["xyz"], "rpy": [np.pi, 0, 0.5]}}, {}, "a weave needs a path"),
+        ({"to": HERE}, {}, "a weave needs a path"),
     ],
 )
 def test_weaves_that_are_none(move, weave, message):

@@ -103,7 +103,8 @@ class _Samples:
         gap = np.square(self.joints - near.T[:, None, None]).sum(axis=0)
         met = raw.residuals.max(axis=0).reshape(gap.shape) <= _MET
         self.cost: Array = np.where(met, gap, np.inf)
-        excess = np.abs(_beyond(self.joints, robot.limits.position)).max(axis=0)
+        self._bounds = robot.limits.position
+        excess = np.abs(_beyond(self.joints, self._bounds)).max(axis=0)
         self._ranked = self.cost + np.where(excess > 0.0, _OUTSIDE * (1.0 + excess), 0.0)
 
     def _local_minima(self) -> tuple[NDArray[np.intp], Array]:
@@ -142,6 +143,7 @@ class _Samples:
         length = 0.25 * np.square(above - below).sum(axis=0)
         ratio = 0.5 * bend / np.where(length > 0.0, length, 1.0)
         curvature = np.where(usable & (length > 0.0), ratio, 1.0)
+        usable &= (_beyond(point, self._bounds) == 0.0).all(axis=0)
         return np.where(usable, point, here), met, np.maximum(curvature, _LEAST_CURVATURE)
 
 
@@ -182,9 +184,9 @@ class _Slide:
         where its pose (`owners`, (K,)) has a row that arrives.
         """
         self._follow(np.arange(len(self.joints)), curvature, _ROUNDS, _WANDERS)
-        arrived = np.zeros(int(owners.max()) + 1, dtype=bool)
-        arrived[owners[self.settled]] = True
-        rows = np.flatnonzero(~arrived[owners])
+        gaps, nearest = np.square(self.joints - self._near).sum(axis=1), np.full(int(owners.max()) + 1, np.inf)
+        np.minimum.at(nearest, owners[self.settled], gaps[self.settled])
+        rows = np.flatnonzero(~self.settled & (gaps < nearest[owners]))
         if len(rows):
             self._follow(rows, np.ones(len(rows)), _MANY_ROUNDS, np.inf)
         q, low, high = self.joints, self._bounds[:, 0], self._bounds[:, 1]

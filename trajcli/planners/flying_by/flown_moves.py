@@ -302,7 +302,7 @@ def stretched_chain(chain: FlownChain, factor: float) -> FlownChain:
     return replace(chain, parts=parts, stretch=chain.stretch * factor)
 
 
-def zone_events(zones: Sequence[FlownZone], names: Sequence[str]) -> Iterator[Event]:
+def zone_events(zones: Sequence[FlownZone]) -> Iterator[Event]:
     """Yield the events of zones that had to shrink, or whose pace was lowered."""
     for zone in zones:
         if zone.used < zone.asked * (1 - _SHRUNK):

@@ -58,7 +58,7 @@ class LineMove(WovenMove):
             return self.woven(path_to(Line(start, end), before, target, self, self.to))
         turning = orientation_along(self.orientation, before[:3, :3], [target], None, None, self.origin)
         if turning.length <= _SAME_ANGLE:
-            return _path_of_no_length(before, target, self.to)
+            return self.woven(_path_of_no_length(before, target, self.to))
         return self.woven(
             path_of_poses(PoseCurve(Pivot(start, end, turning.length), turning), target, self.to)
         )
