@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 from tiers import few
 
 from trajcli.job.read import job_from_text
-from trajcli.planners.flying_by.flown_moves import zone_events
+from trajcli.planners.flying_by.flown_moves import moves_as_flown, zone_events
+from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan, plan_job
 
 LIMITS: dict[str, Any] = {
@@ -230,3 +231,21 @@ def test_what_a_zone_concedes_is_said(
         assert f"at most {' and '.join(parts)} that" in events[-1].message
     if "shrunk" in kinds:
         assert f"{share:.3g} of the" in events[0].message
+
+
+def test_what_is_said_of_a_path_is_said_of_it_as_it_is_flown_and_what_is_of_its_law_is_not() -> None:
+    made = plan()
+    assert made.flyby is not None
+    assert made.flyby.chains is not None
+    of_paths = ["merged", "moved_center", "shrunk", "turns_back", "jerk_limit_both_ways"]
+    events = tuple(Event(kind, "it is so") for kind in [*of_paths, "bound", "refined", "stretched", "braked"])
+    chain, moves = replace(made.flyby.chains[0], stretch=1.25), made.moves[:4]
+    said = [
+        replace(move, planned=replace(move.planned, events=events, wanted_speed=0.5 + k))
+        for k, move in enumerate(moves)
+    ]
+    flown = list(moves_as_flown(said, chain))
+    kinds = {move.index: [event.kind for event in move.planned.events] for move in flown}
+    assert kinds == {0: of_paths, 1: of_paths, 2: [], 3: of_paths}  # the third one stands in a corner
+    assert [move.planned.wanted_speed for move in flown] == [0.5, 1.5, None, 3.5]
+    assert [move.stretch for move in flown] == [1.25, 1.25, 1.0, 1.25]

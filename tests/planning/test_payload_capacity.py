@@ -247,6 +247,16 @@ def test_a_place_is_named_where_all_is_carried_there(
     assert capsys.readouterr().out == f"any mass {where} will do in moves 1, 4\n"
 
 
+def test_what_is_attached_behind_all_moves_is_carried_by_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = tmp_path / "job.yaml"
+    moves = "moves: [{planner: hold, duration: 1}, {attach: {mass: 2}}]\n"
+    job.write_text(EMPTY[: EMPTY.index("moves:")] + moves, encoding="utf-8")
+    assert run_payload(PayloadCommand(job=str(job))) == 0
+    assert capsys.readouterr().out == "any mass will do: no move carries it\n"
+
+
 @pytest.mark.parametrize(
     ("text", "at", "message"),
     [

@@ -54,7 +54,7 @@ def _lines(loaded: LoadedJob, capacity: PayloadCapacity) -> Iterator[str]:
     carried = _carrying(loaded, capacity)
     moves = f"move{'s' * (len(carried) > 1)} {', '.join(map(str, carried))}"
     if capacity.mass is None:
-        yield f"any mass {where} will do in {moves}"
+        yield f"any mass {where} will do in {moves}" if carried else "any mass will do: no move carries it"
         return
     mass = Amount(capacity.mass, rounded="down", digits=6)  # one that verifies
     yield f"largest mass {where} in {moves}: {mass} kg"

@@ -28,7 +28,7 @@ from trajcli.trajectory import MoveInterval, ViaPoints
 _SAMPLES = 513  # of a zone, at which its distances are looked at
 _KEPT = 16  # intervals of the path to its corner, and from there, that pictures show
 _DIMENSIONS: dict[str, Literal["length", "angle"]] = {"position": "length", "orientation": "angle"}
-_OF_PATHS = ("merged", "moved_center", "shrunk", "jerk_limit_both_ways")  # events, not of a law
+_OF_PATHS = ("merged", "moved_center", "shrunk", "turns_back", "jerk_limit_both_ways")  # events, not of a law
 _SHRUNK = 1e-6  # relative: a zone that is smaller by less is as large as was asked for
 
 
