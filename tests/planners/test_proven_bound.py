@@ -274,6 +274,29 @@ def test_a_law_along_a_line_has_the_limits_of_the_direction_of_each_joint(target
         np.testing.assert_array_equal(variable.bounds, [UNEQUAL[kind][joint] for kind in UNEQUAL])
 
 
+def test_limits_are_those_of_each_move_and_in_the_zone_those_of_its_corner() -> None:
+    chain = chain_of_plan(planned([0.9, 0.8], [0.2, 1.5], zone=0.05)).chain
+    (corner,), robots = chain.corners, []
+    for factor in (1.0, 2.0, 3.0):
+        limits = corner.robot.limits
+        twice = {name: factor * getattr(limits, name) for name in ("velocity", "acceleration", "jerk")}
+        robots.append(replace(corner.robot, limits=replace(limits, **twice)))
+    ends = zip(chain.courses, robots[::2], strict=True)
+    changed = replace(
+        chain,
+        courses=tuple(replace(course, robot=robot) for course, robot in ends),
+        corners=(replace(corner, robot=robots[1]),),
+    )
+    before, after = (list(ShareProgramme(each, 4, 3).variables) for each in (chain, changed))
+    for factor, own, other in zip((1.0, 2.0, 2.0, 3.0), before, after, strict=True):
+        np.testing.assert_allclose(other.bounds, factor * own.bounds, rtol=1e-12)
+
+
+def test_joints_that_move_along_one_line_alone_are_in_the_zone() -> None:
+    chain = chain_of_plan(planned([0.9, 1.2], [0.9, 2.0])).chain
+    assert [variable.part for variable in ShareProgramme(chain, 4, 3).variables] == [0, 1, 1, 2]
+
+
 def test_collinear_moves_are_bounded_by_one_move_of_the_whole_way(few_programmes: None) -> None:
     """Over D = 2 with v = 3, a = 8 and j = 60 it is D / v + v / a + a / j."""
     plan = planned([1.0, 1.2], [2.3, 1.2], zone=0.05)

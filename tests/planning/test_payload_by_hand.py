@@ -132,18 +132,17 @@ def test_of_several_payloads_the_one_that_is_meant() -> None:
     assert one == 0
 
 
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_each_of_several_payloads_counts_where_it_is_carried(order: tuple[int, int]) -> None:
-    """The one that is further out binds, whether it is the first or the second."""
-    bounds, coms = np.array([90, 30]), ((0.3, 0.1), (0.0, 0.0))
-    text = HEAD + "limits: {effort: {a: 90, b: 30}}\nstart: {joints: [0, 20]}\nmoves:\n"
-    for k in order:
-        com = [1e3 * x for x in (*coms[k], 0.0)]
-        text += f"  - {{attach: {{mass: 1, com: {com}}}}}\n  - {{planner: hold, duration: 1}}\n  - {{detach: {{}}}}\n"
-    own, each = torques((0, 20), coms[0])
-    found = payload_capacity(job_from_text(text))
-    assert found.mass == pytest.approx(((bounds - own) / each).min(), rel=2e-6)
-    assert found.move == (1, 4)[order[1] == 0]
+@pytest.mark.parametrize("coms", few([([0, 0, 0], [300, 100, 0]), ([300, 100, 0], [0, 0, 0])], 1))
+def test_each_of_several_payloads_counts_where_it_is_carried(coms: tuple[list[float], list[float]]) -> None:
+    """Whether the one that is further out is the first or the second; of motions that are given."""
+    text = HEAD + "limits: {effort: {a: 90, b: 30}}\nstart: {joints: [0, 0]}\nmoves:\n"
+    for com, target in zip(coms, ([90, 20], [0, 0]), strict=True):
+        text += f"  - {{attach: {{mass: MASS, com: {com}}}}}\n"
+        text += f"  - {{planner: quintic, to: {{joints: {target}}}, duration: 2.5}}\n  - {{detach: {{}}}}\n"
+    found = payload_capacity(job_from_text(text.replace("MASS", "1")))
+    assert found.move == 1 + 3 * coms.index([300, 100, 0])
+    assert verifies(text, float(found.mass or 0))
+    assert not verifies(text, float(found.mass or 0) * (1 + 2e-6))
 
 
 def _failing_above(
