@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,8 +14,16 @@ import pytest
 from scipy.spatial import cKDTree
 from tiers import few
 
+from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.job.read import job_from_text
-from trajcli.planners.flying_by.flown_moves import moves_as_flown, zone_events
+from trajcli.kinematics.robot import Robot
+from trajcli.planners.flying_by.flown_moves import (
+    _least_at,
+    _size,
+    flown_zones,
+    moves_as_flown,
+    zone_events,
+)
 from trajcli.planners.planner import Event
 from trajcli.planning.plan import Plan, plan_job
 
@@ -211,6 +221,7 @@ def test_what_flying_by_gains_is_counted_from_the_same_job_with_stops() -> None:
         (1.0, (1.0, 1.0, 1.0), []),
         (1 - 1e-9, (1.0, 1.0, 1.0), []),
         (0.7, (1.0, 1.0, 1.0), ["shrunk"]),
+        (0.995, (1.0, 1.0, 1.0), ["shrunk"]),
         (1.0, (1.0, 0.5, 0.25), ["lowered"]),
         (0.5, (0.5, 1.0, 1.0), ["shrunk", "lowered"]),
     ],
@@ -241,11 +252,100 @@ def test_what_is_said_of_a_path_is_said_of_it_as_it_is_flown_and_what_is_of_its_
     events = tuple(Event(kind, "it is so") for kind in [*of_paths, "bound", "refined", "stretched", "braked"])
     chain, moves = replace(made.flyby.chains[0], stretch=1.25), made.moves[:4]
     said = [
-        replace(move, planned=replace(move.planned, events=events, wanted_speed=0.5 + k))
-        for k, move in enumerate(moves)
+        replace(
+            move,
+            planned=replace(move.planned, events=events, wanted_speed=0.5 + k, continuity=1),
+            robot=faster(move.robot, factor),
+        )
+        for k, (move, factor) in enumerate(zip(moves, (1.0, 2.0, 9.0, 1.5), strict=True))
     ]
     flown = list(moves_as_flown(said, chain))
     kinds = {move.index: [event.kind for event in move.planned.events] for move in flown}
     assert kinds == {0: of_paths, 1: of_paths, 2: [], 3: of_paths}  # the third one stands in a corner
     assert [move.planned.wanted_speed for move in flown] == [0.5, 1.5, None, 3.5]
+    assert [move.planned.continuity for move in flown] == [1, 1, None, 1]
     assert [move.stretch for move in flown] == [1.25, 1.25, 1.0, 1.25]
+    # the looser limits of neighbours that move are in force
+    for move, factor in zip(flown, (2.0, 2.0, 9.0, 2.0), strict=True):
+        np.testing.assert_array_equal(
+            move.robot.limits.velocity, factor * np.array(LIMITS["velocity"]), strict=True
+        )
+    for before, behind in pairwise(flown):
+        np.testing.assert_array_equal(behind.start.position, before.planned.end.position)
+        np.testing.assert_array_equal(behind.start.velocity, before.planned.end.velocity)
+    (resting,) = flown[2].planned.parts
+    assert resting.around is flown[1].planned.parts[-1].around is not None
+    assert (resting.start, resting.end) == (0.0, 0.0)
+
+
+def faster(robot: Robot, factor: float) -> Robot:
+    return replace(robot, limits=replace(robot.limits, velocity=factor * robot.limits.velocity))
+
+
+def test_what_is_said_of_a_zone_is_of_its_corner() -> None:
+    """Its shares and its pace, and the limits there: the second joint has hardly any acceleration."""
+    made = plan()
+    assert made.flyby is not None
+    assert made.flyby.chains is not None
+    chain = made.flyby.chains[0]
+    corners = []
+    for k, corner in enumerate(chain.chain.corners):
+        slow = np.where([[False], [True]], 1e-3, 1.0) * corner.robot.limits.acceleration
+        robot = replace(corner.robot, limits=replace(corner.robot.limits, acceleration=slow))
+        corners.append(replace(corner, robot=robot, shares=(1.0, 0.5, 0.125 / 8**k)))
+    zones = flown_zones(replace(chain, chain=replace(chain.chain, corners=tuple(corners))))
+    assert [zone.binds for zone in zones] == ["acceleration of j2"] * 2
+    assert [zone.shares for zone in zones] == [(1.0, 0.5, 0.125), (1.0, 0.5, 0.125 / 8)]
+    assert [zone.pace for zone in zones] == pytest.approx([0.5, 0.25])  # the jerk goes with its third power
+
+
+@pytest.mark.parametrize(
+    ("offsets", "wanted"),
+    [
+        (((0.010, 0.016), (0.09, 0.07)), ("position", 0.02, 0.016)),
+        (((0.016, 0.019), (0.07, 0.04)), ("position", 0.02, 0.016)),
+        (((0.016, 0.019), (0.09, 0.04)), ("orientation", 0.1, 0.09)),
+    ],
+)
+def test_of_several_sizes_of_a_zone_the_one_of_which_most_is_used_at_the_nearer_border_is_named(
+    offsets: tuple[tuple[float, float], tuple[float, float]], wanted: tuple[str, float, float]
+) -> None:
+    zone = SimpleNamespace(needs_geometry=True, position=0.02, orientation=0.1, joints=None)
+    distance, angle = (np.array(each) for each in offsets)
+    around = SimpleNamespace(zone=zone, joint_sizes=np.ones(2), offsets=lambda _: (distance, angle))
+    curve = PiecewisePolynomial(np.array([0.0, 1.0]), np.zeros((1, 1, 2)))
+    name, joint, asked, used = _size(around, curve)  # type: ignore[arg-type]
+    assert (name, asked, used) == wanted
+    assert joint is None
+
+
+@pytest.mark.parametrize("slope", [1.0, -1.0])
+def test_a_place_is_never_at_the_end_of_a_motion(slope: float) -> None:
+    """No part of a move would be left before it, or behind it."""
+    curve = PiecewisePolynomial(np.array([2.0, 3.0]), np.array([[[1.0]], [[0.0]]]))
+    time = _least_at(lambda times: slope * times, curve)
+    assert 2.0 < time < 3.0
+    assert min(time - 2.0, 3.0 - time) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("of", "joint", "text"),
+    [
+        ("position", None, "has 50 mm, 0.5 of the 100 mm that"),
+        ("orientation", None, "has 2.86478898 deg, 0.5 of the 5.72957795 deg that"),
+        ("joints", 0, "has 2.86478898 deg, 0.5 of the 5.72957795 deg that"),
+        ("joints", 1, "has 50 mm, 0.5 of the 100 mm that"),
+    ],
+)
+def test_sizes_of_zones_are_said_in_the_units_of_what_they_measure(
+    of: str, joint: int | None, text: str
+) -> None:
+    job = {"version": 1, "units": {"angle": "deg", "length": "mm"}, "start": {"joints": [0, 0]}}
+    robot = {"joints": [{"name": "turn"}, {"name": "lift", "type": "prismatic"}]}
+    moves = [{"planner": "hold", "duration": 1}]
+    say = job_from_text(json.dumps({**job, "robot": robot, "moves": moves})).say
+    made = plan()
+    assert made.flyby is not None
+    zone = replace(made.flyby.zones[0], of=of, joint=joint, asked=0.1, used=0.05, shares=(1.0, 1.0, 1.0))
+    (event,) = zone_events([zone])
+    assert text in event.text(say)

@@ -204,6 +204,29 @@ def test_where_a_refusal_has_no_time_it_is_that_of_the_largest_effort_with_the_m
     assert found.time == pytest.approx(peak, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("stopping", "flying", "wanted"), [(2.0, 1.0, 1.0), (1.0, 2.0, 2.0), (-1.0, 2.0, 2.0)]
+)
+def test_what_flies_by_corners_carries_less_or_more_than_what_stops(
+    stopping: float, flying: float, wanted: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where nothing that stops verifies; the arm drops what is heavier."""
+    monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 0.05)
+    moves = [f"{{planner: quintic, to: {{joints: [{x}, 20]}}, duration: 1}}" for x in (10, 20)]
+    text = HORIZONTAL[: HORIZONTAL.index("moves:")] + f"zone: 10\nmoves: [{', '.join(moves)}]\n"
+    loaded = job_from_text(text)
+    assert loaded.job.flies_by
+
+    def planned(given: LoadedJob, carried: Callable[..., Payload | None]) -> Plan:
+        payload = carried(0, None)
+        assert payload is not None
+        if payload.mass > (flying if given.job.flies_by else stopping):
+            raise PlanningError("it slips")
+        return plan_job(replace(given, job=given.job.with_stops()), carried, advise=False)
+
+    assert payload_capacity(loaded, planned=planned).mass == pytest.approx(wanted, rel=0.1)
+
+
 def test_what_is_no_effort_has_no_joint_that_needs_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """With more than two kilograms this job is too fast."""
     monkeypatch.setattr("trajcli.planning.payload_capacity._CLOSE", 0.1)

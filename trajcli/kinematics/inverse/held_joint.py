@@ -184,7 +184,10 @@ class _Slide:
         where its pose (`owners`, (K,)) has a row that arrives.
         """
         self._follow(np.arange(len(self.joints)), curvature, _ROUNDS, _WANDERS)
-        gaps, nearest = np.square(self.joints - self._near).sum(axis=1), np.full(int(owners.max()) + 1, np.inf)
+        gaps, nearest = (
+            np.square(self.joints - self._near).sum(axis=1),
+            np.full(int(owners.max()) + 1, np.inf),
+        )
         np.minimum.at(nearest, owners[self.settled], gaps[self.settled])
         rows = np.flatnonzero(~self.settled & (gaps < nearest[owners]))
         if len(rows):
