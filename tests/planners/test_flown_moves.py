@@ -15,13 +15,16 @@ from scipy.spatial import cKDTree
 from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
+from trajcli.errors import PlanningError
 from trajcli.job.read import job_from_text
 from trajcli.kinematics.robot import Robot
 from trajcli.planners.flying_by.flown_moves import (
     _least_at,
+    _passed,
     _size,
     flown_zones,
     moves_as_flown,
+    stretched_chain,
     zone_events,
 )
 from trajcli.planners.planner import Event
@@ -325,7 +328,7 @@ def test_a_place_is_never_at_the_end_of_a_motion(slope: float) -> None:
     curve = PiecewisePolynomial(np.array([2.0, 3.0]), np.array([[[1.0]], [[0.0]]]))
     time = _least_at(lambda times: slope * times, curve)
     assert 2.0 < time < 3.0
-    assert min(time - 2.0, 3.0 - time) < 1e-5
+    assert 0.9e-6 < min(time - 2.0, 3.0 - time) < 1e-5
 
 
 @pytest.mark.parametrize(
@@ -349,3 +352,54 @@ def test_sizes_of_zones_are_said_in_the_units_of_what_they_measure(
     zone = replace(made.flyby.zones[0], of=of, joint=joint, asked=0.1, used=0.05, shares=(1.0, 1.0, 1.0))
     (event,) = zone_events([zone])
     assert text in event.text(say)
+
+
+def test_a_chain_that_takes_longer_passes_the_same_places() -> None:
+    made = plan()
+    assert made.flyby is not None
+    assert made.flyby.chains is not None
+    chain = made.flyby.chains[0]
+    tool: Any = SimpleNamespace(scaled=lambda factor: ("slower", factor))
+    chain = replace(chain, parts=(replace(chain.parts[0], tool=tool), *chain.parts[1:]))
+    longer = stretched_chain(chain, 2.0)
+    assert longer.duration == pytest.approx(2 * chain.duration, rel=1e-12)
+    for own, other in zip(chain.parts, longer.parts, strict=True):
+        assert (own.law is None) == (other.law is None)
+        curves = [(own.curve, other.curve)]
+        if own.law is not None and other.law is not None:
+            curves.append((own.law, other.law))
+        for one, slow in curves:
+            times = np.linspace(0.0, one.duration, 7)
+            for order in range(4):
+                rates = slow.evaluate(slow.start + 2 * times, order) * 2.0**order
+                np.testing.assert_allclose(rates, one.evaluate(one.start + times, order), rtol=0, atol=1e-9)
+    assert longer.parts[0].tool == ("slower", 2.0)
+    again = stretched_chain(replace(chain, stretch=2.0), 1.5)
+    assert (longer.stretch, again.stretch) == (2.0, 3.0)
+    assert stretched_chain(chain, 1.0) is chain
+    moving = replace(chain, chain=replace(chain.chain, ends=(np.array([0.1, 0.0]), np.zeros(2))))
+    with pytest.raises(PlanningError, match="begins in motion"):
+        stretched_chain(moving, 2.0)
+
+
+def test_points_between_zones_are_passed_when_the_law_is_there() -> None:
+    """Points at s of 0.1 to 0.6; the course is followed from 0.25 to 0.5, at 0.1 m/s, behind a zone of 0.75 s."""
+    points = SimpleNamespace(
+        s=np.array([0.1, 0.3, 0.4, 0.6]),
+        points=np.arange(8.0).reshape(4, 2),
+        missed=np.arange(8.0).reshape(4, 2) * 1e-3,
+    )
+    law = PiecewisePolynomial(np.array([2.0, 4.5]), np.array([[[0.1]], [[0.25]]]))
+    courses = (None, SimpleNamespace(passed=points))
+    of_moves = SimpleNamespace(courses=courses, stretch=lambda number: {1: (0.25, 0.5)}[number])
+    parts = (None, None, SimpleNamespace(law=law))
+    chain: Any = SimpleNamespace(chain=of_moves, parts=parts)
+    zone, path = SimpleNamespace(start=0.0, around=1), SimpleNamespace(start=0.75, around=None)
+    intervals: Any = (zone, path)
+    passed = _passed(chain, 1, intervals)
+    assert passed is not None
+    np.testing.assert_allclose(passed.times, [1.25, 2.25], rtol=1e-12)
+    np.testing.assert_array_equal(passed.points, points.points[1:3])
+    np.testing.assert_array_equal(passed.missed, points.missed[1:3])
+    points.s = np.array([0.1, 0.2, 0.6, 0.7])
+    assert _passed(chain, 1, intervals) is None
