@@ -170,7 +170,6 @@ def test_the_limit_of_which_a_zone_uses_most_counts_by_its_direction(sign: int) 
     assert used[zone.binds] == pytest.approx(max(used.values()), rel=1e-4)
 
 
-@pytest.mark.full
 def test_pictures_of_a_zone_are_about_its_corner() -> None:
     made = plan()
     assert made.flyby is not None
@@ -247,7 +246,9 @@ def test_what_a_zone_concedes_is_said(
         assert f"{share:.3g} of the" in events[0].message
 
 
-def test_what_is_said_of_a_path_is_said_of_it_as_it_is_flown_and_what_is_of_its_law_is_not() -> None:
+def test_what_is_said_of_a_path_is_said_of_it_as_it_is_flown_and_what_is_of_its_law_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     made = plan()
     assert made.flyby is not None
     assert made.flyby.chains is not None
@@ -262,7 +263,9 @@ def test_what_is_said_of_a_path_is_said_of_it_as_it_is_flown_and_what_is_of_its_
         )
         for k, (move, factor) in enumerate(zip(moves, (1.0, 2.0, 9.0, 1.5), strict=True))
     ]
+    monkeypatch.setattr("trajcli.planners.flying_by.flown_moves._passed", lambda _, number, __: number)
     flown = list(moves_as_flown(said, chain))
+    assert [move.planned.via_points for move in flown] == [0, 1, None, 2]
     kinds = {move.index: [event.kind for event in move.planned.events] for move in flown}
     assert kinds == {0: of_paths, 1: of_paths, 2: [], 3: of_paths}  # the third one stands in a corner
     assert [move.planned.wanted_speed for move in flown] == [0.5, 1.5, None, 3.5]
