@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 import pytest
 from conventions import in_convention
-from inverse_arms import FAMILIES, arm, counts_by_search, gap, random_joints, turning
+from inverse_arms import FAMILIES, WRIST, arm, counts_by_search, gap, random_joints, turning
 from tiers import few
 
 from trajcli.kinematics.forward import forward
@@ -54,6 +54,27 @@ def test_closed_forms_hold_for_ten_thousand_poses(name):
     few = slice(0, 200)
     same = found.count[few] == counts_by_search(robot, poses[few])
     assert np.count_nonzero(~same) <= 1  # a branch whose basin no seed meets
+
+
+@pytest.mark.parametrize(
+    "rows", [["P 0 .4 0 0", "R 0 0 .3 0", "R 0 0 .25 2"], ["R 0 .4 .3 0", "P 0 0 0 0", "R 0 0 .25 2"]]
+)
+def test_a_wrist_over_a_slide_that_turns_follow(rows, monkeypatch):
+    """The slide is before, or between, the turns that move the wrist."""
+    rng = np.random.default_rng(4)
+    monkeypatch.setitem(FAMILIES, "lifted", ([*rows, *WRIST], 4, "spherical wrist"))
+    robot = arm("lifted", rng)
+    assert (method_for(robot).family, len(method_for(robot).branches)) == ("spherical wrist", 4)
+    poses, found = check_random_poses(robot, rng, 40)
+    assert found.count[:2].tolist() == counts_by_search(robot, poses[:2]).tolist()
+
+
+def test_a_slide_that_is_slanted_to_two_parallel_turns_gives_more_than_its_height(monkeypatch):
+    monkeypatch.setitem(FAMILIES, "slanted", (["R 0 .4 .3 0", "R 0 0 .25 .4", "P 0 0 0 0"], 2, "positioning"))
+    robot = arm("slanted", np.random.default_rng(4))
+    assert method_for(robot).name == "SCARA base (RRP)"
+    assert [str(branch) for branch in method_for(robot).branches] == ["up", "down"]
+    check_random_poses(robot, np.random.default_rng(5), 40)
 
 
 @pytest.mark.parametrize("name", few(NAMES, 9))
