@@ -24,6 +24,7 @@ from trajcli.units import (
     to_user,
     typeset,
     unit_name,
+    units_of,
 )
 
 ANGLE, VELOCITY, ACCELERATION, JERK = (Quantity("angle", order) for order in range(4))
@@ -222,3 +223,19 @@ def test_what_joints_measure() -> None:
 )
 def test_amounts_of_messages_are_said_in_the_units_of_the_user(amount: Amount, text: str) -> None:
     assert amount_text(amount, ["revolute", "prismatic"], DEG_MM) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "units"),
+    [
+        ({}, Units()),
+        (None, Units()),
+        ("deg", Units()),
+        ({"angle": "deg"}, Units("deg")),
+        ({"length": "mm"}, Units(length="mm")),
+        ({"angle": "degrees", "length": "mm"}, Units(length="mm")),
+        ({"angle": "deg", "length": 3, "time": "ms"}, Units("deg")),
+    ],
+)
+def test_units_are_those_that_are_right(value: object, units: Units) -> None:
+    assert units_of(value) == units

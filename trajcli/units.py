@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from trajcli.errors import Amount
@@ -92,6 +92,13 @@ class Units:
             raise ValueError(
                 f"no such units: angle {self.angle!r}, length {self.length!r}; expected rad or deg, m or mm"
             )
+
+
+def units_of(value: object) -> Units:
+    """Return the units that a mapping states as far as they are right; what is left out is SI."""
+    given = value if isinstance(value, Mapping) else {}
+    angle, length = given.get("angle"), given.get("length")
+    return Units("deg" if angle == "deg" else "rad", "mm" if length == "mm" else "m")
 
 
 @comparable

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from trajcli.errors import InputError
-from trajcli.job.model import units_of
 from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.units import Units
 
@@ -32,22 +31,6 @@ def refused(said: str, *given: str, **named: str) -> tuple[int, str]:
     place = problem.place
     assert place is not None
     return place.line, place.source[place.column - 1 : place.column - 1 + place.length]
-
-
-@pytest.mark.parametrize(
-    ("value", "units"),
-    [
-        ({}, Units()),
-        (None, Units()),
-        ("deg", Units()),
-        ({"angle": "deg"}, Units("deg")),
-        ({"length": "mm"}, Units(length="mm")),
-        ({"angle": "degrees", "length": "mm"}, Units(length="mm")),
-        ({"angle": "deg", "length": 3, "time": "ms"}, Units("deg")),
-    ],
-)
-def test_units_are_those_that_are_right(value: object, units: Units) -> None:
-    assert units_of(value) == units
 
 
 def test_rows_are_at_1000_hz_with_three_derivatives_unless_said_otherwise() -> None:

@@ -21,6 +21,7 @@ from trajcli.language.numbers import (
     ReadingContext,
     flaw_of_name,
     number_schema,
+    object_schema,
     read_number,
     shown,
 )
@@ -228,3 +229,11 @@ def test_named_values_survive_a_process() -> None:
     values = NamedValues((1.0, 0.0, 3.0), (True, False, True))
     again = pickle.loads(pickle.dumps(values))
     assert (again, again.named, again.by_index) == (values, values.named, {0: 1.0, 2: 3.0})
+
+
+def test_a_mapping_has_the_keys_that_it_needs_and_no_others() -> None:
+    schema = object_schema({"a": {"type": "integer"}, "b": {}}, "a", description="Both.")
+    valid = Draft202012Validator(schema).is_valid
+    given = ({"a": 1}, {"a": 1, "b": None}, {"b": 1}, {"a": 1, "c": 1}, {"a": "1"}, [1])
+    assert [valid(each) for each in given] == [True, True, False, False, False, False]
+    assert schema["description"] == "Both."

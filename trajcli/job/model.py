@@ -37,6 +37,7 @@ from trajcli.language.numbers import (
     Number,
     PointName,
     ReadingContext,
+    object_schema,
     refuse,
     shown,
 )
@@ -67,18 +68,6 @@ class UnitsSpec(Model):
         return Units(self.angle, self.length)
 
 
-def units_of(value: Any) -> Units:  # noqa: ANN401
-    """Return a file's units as far as they are right; what is wrong is reported with the rest."""
-    given = value if isinstance(value, Mapping) else {}
-    right: dict[str, Any] = {}
-    for key in ("angle", "length"):
-        try:
-            right |= {key: getattr(UnitsSpec.model_validate({key: given[key]}), key)} if key in given else {}
-        except ValidationError:
-            continue
-    return Units(**right)
-
-
 @comparable
 class RobotSource(FieldType):
     """A robot, with which the loader has replaced what names it."""
@@ -104,13 +93,8 @@ class RobotSource(FieldType):
         }
         inline = {"$comment": ROBOT_DEFINITION}
         on_rail = {"$comment": RAIL_DEFINITION}
-        forms = [{"$comment": CATALOGUE_NAME}, _keys(file, "file"), _keys(urdf, "urdf"), inline, on_rail]
-        return {"anyOf": forms}
-
-
-def _keys(properties: JsonSchemaValue, needed: str) -> JsonSchemaValue:
-    shape = {"type": "object", "properties": properties, "required": [needed]}
-    return {**shape, "additionalProperties": False}
+        of_file, of_urdf = object_schema(file, "file"), object_schema(urdf, "urdf")
+        return {"anyOf": [{"$comment": CATALOGUE_NAME}, of_file, of_urdf, inline, on_rail]}
 
 
 class _FirstRow:
@@ -133,9 +117,8 @@ class _FirstRow:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         keys = {"csv": {"type": "string", "description": "A recording, relative to the job's folder."}}
-        file = {"type": "object", "properties": keys, "required": ["csv"], "additionalProperties": False}
         state = handler(schema)
-        return {**state, "anyOf": [*state["anyOf"], file]}
+        return {**state, "anyOf": [*state["anyOf"], object_schema(keys, "csv")]}
 
 
 def _first_row(value: Mapping[str, Any], context: ReadingContext) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from trajcli.errors import InputError, Place
 from trajcli.frozen import frozen
 from trajcli.job.yaml.document import Document, Node
 from trajcli.job.yaml.load import MAX_DEPTH, parse_document
+from trajcli.units import units_of
 
 if TYPE_CHECKING:
     from trajcli.kinematics.robot import Robot
@@ -185,7 +186,6 @@ def _default(document: Document, path: _Steps, step: str | int) -> Any:  # noqa:
 
 def _robot(document: Document) -> Robot:
     """Return the robot of a job, as it is without the job's limits."""
-    from trajcli.job.model import units_of
     from trajcli.job.robot import find_sheet
 
     plain = document.plain()
@@ -197,7 +197,6 @@ def _in_force(document: Document, *, scaled: bool) -> Robot:
     from trajcli.job.files.moveit_limits import read_moveit_limits
     from trajcli.job.limits import with_job_limits
     from trajcli.job.messages import validated
-    from trajcli.job.model import units_of
     from trajcli.language.limits import JobLimitsSpec, LimitsSpec, Scale
     from trajcli.language.numbers import ReadingContext
 

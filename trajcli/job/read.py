@@ -21,7 +21,7 @@ from trajcli.job.limits import (
     looser_tool_bounds,
     with_job_limits,
 )
-from trajcli.job.model import Job, units_of
+from trajcli.job.model import Job
 from trajcli.job.robot import RobotSheet, find_sheet
 from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document, parse_document, read_document
@@ -32,7 +32,7 @@ from trajcli.language.poses import Pose
 from trajcli.language.targets import PoseFields, Target
 from trajcli.planners.planner import Event, Planner
 from trajcli.trajectory import move_title
-from trajcli.units import Units, amount_text
+from trajcli.units import Units, amount_text, units_of
 
 if TYPE_CHECKING:
     from trajcli.language.recorded import Recorded, RecordedPoses

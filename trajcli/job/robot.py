@@ -40,7 +40,7 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.per_joint import UNLIMITED, LowerUpper
 from trajcli.language.poses import Pose
-from trajcli.units import Quantity, Units
+from trajcli.units import Quantity, Units, units_of
 
 if TYPE_CHECKING:
     from trajcli.urdf.serial_robot import UrdfRobot
@@ -402,9 +402,7 @@ def _sheet_of(content: bytes, path: str, *, own_efforts: bool) -> RobotSheet:
     """Return the sheet of a robot file's content: many jobs of one process read it once."""
     document = parse_document(content, path)
     plain = document.plain()
-    spec = plain.get("units") if isinstance(plain.get("units"), Mapping) else {}
-    angle, length = spec.get("angle"), spec.get("length")
-    units = Units("deg" if angle == "deg" else "rad", "mm" if length == "mm" else "m")
+    units = units_of(plain.get("units"))
     model = _validated({"name": utf8(Path(path).stem), **plain}, document, (), units, RobotModel)
     text, conceded = "\n".join(document.lines), tuple[tuple[str, str], ...]()
     if "matrix" in text:

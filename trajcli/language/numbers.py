@@ -226,6 +226,12 @@ def magnitude_schema(quantity: Quantity, *, positive: bool = False) -> JsonSchem
     return {"minimum": _least(quantity) if positive else -largest, "maximum": largest}
 
 
+def object_schema(properties: Mapping[str, Any], *required: str, **stated: Any) -> JsonSchemaValue:  # noqa: ANN401
+    """Return the JSON schema of a mapping that has no other keys; what else is stated stands at its end."""
+    shape = {"type": "object", "properties": dict(properties), "required": list(required)}
+    return {**shape, "additionalProperties": False, **stated}
+
+
 def number_schema(quantity: Quantity, **stated: float) -> JsonSchemaValue:
     """Return the JSON schema of a number, or of a string with its unit where the quantity has one.
 

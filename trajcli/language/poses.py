@@ -23,6 +23,7 @@ from trajcli.language.numbers import (
     ReadingContext,
     flaws_below,
     number_schema,
+    object_schema,
     read_number,
     refuse,
     shown,
@@ -110,10 +111,15 @@ class Pose(FieldType):
                 "description": "Axis times angle, as rx, ry, rz of a UR pendant (angle unit).",
             },
             "matrix": {**MATRIX_SCHEMA, "description": "Rotation 3x3, or homogeneous 4x4."},
-            "axis_angle": _object(
-                {"axis": AXIS_SCHEMA, "angle": number_schema(_ANGLE)}, "Rotation by an angle about an axis."
+            "axis_angle": object_schema(
+                {"axis": AXIS_SCHEMA, "angle": number_schema(_ANGLE)},
+                "axis",
+                "angle",
+                description="Rotation by an angle about an axis.",
             ),
-            "euler": _object(euler, "Euler angles about current or fixed axes.", "sequence", "angles"),
+            "euler": object_schema(
+                euler, "sequence", "angles", description="Euler angles about current or fixed axes."
+            ),
         }
         return {"type": "object", "properties": described, "additionalProperties": False}
 
@@ -124,12 +130,6 @@ def moved(pose: Array, offset: Array, axes: Array) -> Array:
     result[:3, :3] = axes @ offset[:3, :3] @ axes.T @ pose[:3, :3]
     result[:3, 3] = pose[:3, 3] + axes @ offset[:3, 3]
     return result
-
-
-def _object(properties: Mapping[str, Any], description: str, *required: str) -> JsonSchemaValue:
-    needed = list(required or properties)
-    shape = {"type": "object", "properties": dict(properties), "required": needed}
-    return {**shape, "additionalProperties": False, "description": description}
 
 
 def _pose(value: Mapping[str, Any], form: str | None, context: ReadingContext) -> Array:

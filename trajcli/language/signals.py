@@ -9,7 +9,16 @@ from typing import Any, Literal, get_args
 from pydantic.json_schema import JsonSchemaValue
 
 from trajcli.frozen import comparable
-from trajcli.language.numbers import AT_KEY, FlawError, Name, Number, ReadingContext, flaws_below, shown
+from trajcli.language.numbers import (
+    AT_KEY,
+    FlawError,
+    Name,
+    Number,
+    ReadingContext,
+    flaws_below,
+    object_schema,
+    shown,
+)
 from trajcli.language.per_joint import read_each
 from trajcli.units import Quantity
 
@@ -89,16 +98,15 @@ def written_signals(value: tuple[SignalAt, ...], context: ReadingContext) -> lis
 
 def schema_of_signals() -> JsonSchemaValue:
     """Return the schema of one signal, or a list of them."""
-    path = {"type": "object", "properties": {"path": _PATH.json_schema()}, "required": ["path"]}
-    when = {"anyOf": [{"enum": list(_MOMENTS)}, {**path, "additionalProperties": False}]}
+    path = object_schema({"path": _PATH.json_schema()}, "path")
+    when = {"anyOf": [{"enum": list(_MOMENTS)}, path]}
     parts = {
         "signal": {**_NAME.json_schema(), "description": "Name of the signal."},
         "value": {**_VALUE.json_schema(), "description": "What it is from then on."},
         "when": {**when, "default": "nearest", "description": "About the corner, or along the path."},
         "before": {**_BEFORE.json_schema(), "default": 0.0, "description": "So much earlier (s)."},
     }
-    shape = {"type": "object", "properties": parts, "required": ["signal", "value"]}
-    one = {**shape, "additionalProperties": False}
+    one = object_schema(parts, "signal", "value")
     return {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
 
 

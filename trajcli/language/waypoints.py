@@ -17,6 +17,7 @@ from trajcli.language.numbers import (
     ReadingContext,
     flaws_below,
     number_schema,
+    object_schema,
     refuse,
     shown,
 )
@@ -94,7 +95,6 @@ class PointsField(ListOrRecorded):
             "csv": {"type": "string", "description": "A file of joint values, relative to the job's folder."},
             "merge": {**_MERGE.json_schema(), "default": 0, "description": _MERGE.description},
         }
-        file = {"type": "object", "properties": keys, "required": ["csv"], "additionalProperties": False}
         rows = {"type": "array", "items": PerJoint(0, "").json_schema(), "minItems": 1}
         table = {
             "positions": {**rows, "description": "Joint values, one row for each point."},
@@ -105,8 +105,8 @@ class PointsField(ListOrRecorded):
             },
             "merge": keys["merge"],
         }
-        inline = {"type": "object", "properties": table, "required": ["positions"]}
-        return {"anyOf": [handler(schema), file, {**inline, "additionalProperties": False}]}
+        forms = [object_schema(keys, "csv"), object_schema(table, "positions")]
+        return {"anyOf": [handler(schema), *forms]}
 
 
 Through = Annotated[tuple[NamedWaypoint, ...] | Recorded, PointsField()]

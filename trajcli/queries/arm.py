@@ -26,6 +26,7 @@ from trajcli.units import (
     factor,
     joint_quantity,
     unit_name,
+    units_of,
 )
 
 if TYPE_CHECKING:
@@ -193,11 +194,7 @@ def stated_units(name: str) -> Units | None:
     if name in catalogue_names() or name == "-" or is_urdf(name):
         return None
     units = read_document(name).plain().get("units")
-    if not isinstance(units, Mapping) or not units:
-        return None
-    return Units(
-        "deg" if units.get("angle") == "deg" else "rad", "mm" if units.get("length") == "mm" else "m"
-    )
+    return units_of(units) if isinstance(units, Mapping) and units else None
 
 
 def open_arm(

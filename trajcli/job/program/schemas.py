@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from trajcli.language.numbers import LONGEST_NAME, number_schema
+from trajcli.language.numbers import LONGEST_NAME, number_schema, object_schema
 from trajcli.units import Quantity
 
 MOVES_DEFINITION = "a list of moves"
@@ -14,13 +12,8 @@ _LABEL = {**_NAME, "maxLength": LONGEST_NAME, "description": "What it is for, sh
 _LISTED = {"type": "array", "items": _NAME, "minItems": 1, "uniqueItems": True}
 
 
-def _mapping(properties: dict[str, Any], *required: str, description: str) -> dict[str, Any]:
-    shape = {"type": "object", "properties": properties, "required": list(required)}
-    return {**shape, "additionalProperties": False, "description": description}
-
-
 STRUCTURES = (
-    _mapping(
+    object_schema(
         {
             "repeat": {
                 "anyOf": [{"type": "integer", "minimum": 1}, _NAME, _LISTED],
@@ -34,7 +27,7 @@ STRUCTURES = (
         "moves",
         description="Moves that are done several times.",
     ),
-    _mapping(
+    object_schema(
         {"call": {**_NAME, "description": "Name of a sequence under `sequences`."}, "label": _LABEL},
         "call",
         description="The moves of a sequence.",
@@ -47,7 +40,7 @@ _NUMBERS = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxIte
 STRAIGHT = {
     "anyOf": [
         _DISTANCE,
-        _mapping(
+        object_schema(
             {
                 "distance": {**_DISTANCE, "description": "How far from the end of it (length unit)."},
                 "axis": {
@@ -69,7 +62,7 @@ STRAIGHT = {
 }
 """What stands under `approach` and `retreat`."""
 
-_STEP = _mapping(
+_STEP = object_schema(
     {
         "count": {"type": "integer", "minimum": 1, "description": "Places, the first included."},
         "xyz": {
@@ -84,7 +77,7 @@ _STEP = _mapping(
     "xyz",
     description="One direction of a grid.",
 )
-_GRID = _mapping(
+_GRID = object_schema(
     {
         "from": {**_NAME, "description": "The first place."},
         "steps": {
@@ -100,7 +93,7 @@ _GRID = _mapping(
     description="Places in rows and columns.",
 )
 MANY = (
-    _mapping({"grid": _GRID}, "grid", description="Many: a place for each round of a repeat."),
+    object_schema({"grid": _GRID}, "grid", description="Many: a place for each round of a repeat."),
     {**_LISTED, "description": "Many: names, one for each round of a repeat."},
 )
 """What stands under a name that is many."""

@@ -31,6 +31,7 @@ from trajcli.language.numbers import (
     Number,
     ReadingContext,
     flaws_below,
+    object_schema,
     refuse,
     shown,
 )
@@ -97,9 +98,8 @@ class Segment(Model):
         return self
 
 
-_SCHEMA_OF_FILE: dict[str, Any] = {
-    "type": "object",
-    "properties": {
+_SCHEMA_OF_FILE = object_schema(
+    {
         "csv": {
             "type": "string",
             "description": "A file of poses, relative to the job's folder: columns x, y, z (m, or x_mm ...) "
@@ -112,9 +112,8 @@ _SCHEMA_OF_FILE: dict[str, Any] = {
             "description": _MERGE.description,
         },
     },
-    "required": ["csv"],
-    "additionalProperties": False,
-}
+    "csv",
+)
 
 
 class SegmentsField(ListOrRecorded):
