@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -140,6 +140,17 @@ def refuse(flaws: Sequence[Flaw]) -> PydanticCustomError:
     return PydanticCustomError(
         "flaws", "{text}", {"text": "; ".join(flaw[1] for flaw in flaws), "flaws": list(flaws)}
     )
+
+
+def refuse_flaws(flaws: Iterable[Flaw]) -> None:
+    """Raise the error that carries the flaws of one value, where it has any.
+
+    Raises:
+        PydanticCustomError: With all of them.
+    """
+    found = list(flaws)
+    if found:
+        raise refuse(found)
 
 
 class _Null:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -138,6 +139,13 @@ class EulerSpec(Model):
     angles: Annotated[Row, Numbers(3, _ANGLE, "The three angles (angle unit).")]
 
 
+def _refuse_two(given: Sequence[str]) -> None:
+    """Refuse two keys of which only one may be given."""
+    if len(given) > 1:
+        text = f"{given[0]} and {given[1]} exclude each other"
+        raise refuse([((given[1],), text, "leave one of them out")])
+
+
 class PoseFields(Model):
     """A pose of the tcp in world: a position, an orientation or a part of one, or both."""
 
@@ -170,9 +178,7 @@ class PoseFields(Model):
     @model_validator(mode="after")
     def _is_one_pose(self) -> PoseFields:
         given = [key for key in (*ROTATIONS, *AIMS) if getattr(self, key) is not None]
-        if len(given) > 1:
-            text = f"{given[0]} and {given[1]} exclude each other"
-            raise refuse([((given[1],), text, "leave one of them out")])
+        _refuse_two(given)
         if given and given[0] in ROTATIONS:
             try:
                 self.full_pose()
@@ -317,9 +323,7 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
             raise refuse([(("in",), "only a job has frames", "give the pose in world")])
         given = [key for key in ("joints", "joints_by") if getattr(self, key) is not None]
         given += [*self.pose_keys[:1], *(["from"] if self.relative is not None else [])]
-        if len(given) > 1:
-            text = f"{given[0]} and {given[1]} exclude each other"
-            raise refuse([((given[1],), text, "leave one of them out")])
+        _refuse_two(given)
         if isinstance(self.joints_by, NamedValues) and not any(self.joints_by.named):
             raise refuse([(("joints_by",), "no joint is named", "name one, or leave it out")])
         if not given and self.velocity is None:

@@ -15,7 +15,7 @@ from trajcli.geometry.paths.arc import Arc
 from trajcli.geometry.paths.position import SAME_POINT, PositionCurve
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import Flaw, Model, Number, refuse
+from trajcli.language.numbers import Flaw, Model, Number, refuse_flaws
 from trajcli.language.points import NamedTarget
 from trajcli.language.targets import Direction, Numbers, Row, Target
 from trajcli.planners.planner import Event
@@ -49,9 +49,7 @@ class ArcFields(Model):
 
     @model_validator(mode="after")
     def _is_one_arc(self) -> ArcFields:
-        flaws = list(self._flaws())
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws(self._flaws())
         return self
 
     def _flaws(self) -> Iterator[Flaw]:

@@ -23,7 +23,7 @@ from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import ToolLimits
 from trajcli.language.limits import AngularAcceleration, AngularSpeed, ToolAcceleration, ToolJerk, ToolSpeed
-from trajcli.language.numbers import Flaw, Model, refuse
+from trajcli.language.numbers import Flaw, Model, refuse_flaws
 from trajcli.language.targets import Duration, MinimumDuration
 from trajcli.planners.planner import Phase
 from trajcli.planners.tool_path.derivatives import PathDerivatives, path_derivatives
@@ -363,8 +363,7 @@ class LawSpec(Model):
         if self.duration is not None and not self.time_law.takes_duration:
             text = f"a {self.shape} law is as short as its limits allow"
             flaws.append((("duration",), text, "say `minimum_duration`, or use another shape"))
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws(flaws)
         return self
 
 

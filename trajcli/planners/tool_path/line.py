@@ -13,7 +13,7 @@ from trajcli.geometry.paths.orientation import FixedOrientation
 from trajcli.geometry.paths.pose import PoseCurve, Screw
 from trajcli.geometry.paths.position import SAME_POINT, Line, Pivot
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import Model, refuse
+from trajcli.language.numbers import Model, refuse_flaws
 from trajcli.language.points import NamedTarget
 from trajcli.language.targets import Target
 from trajcli.planners.tool_path.law import LawSpec
@@ -45,9 +45,7 @@ class LineMove(WovenMove):
 
     @model_validator(mode="after")
     def _ends_at_rest(self) -> LineMove:
-        flaws = list(flaws_of_target(self.to, ("to",), self.tag))
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws(flaws_of_target(self.to, ("to",), self.tag))
         return self
 
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:
@@ -76,9 +74,7 @@ class ScrewMove(ToolPathMove):
 
     @model_validator(mode="after")
     def _ends_at_rest(self) -> ScrewMove:
-        flaws = list(flaws_of_target(self.to, ("to",), self.tag))
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws(flaws_of_target(self.to, ("to",), self.tag))
         return self
 
     def path_from(self, before: Array, robot: Robot) -> PlannedPath:

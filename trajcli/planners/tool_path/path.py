@@ -15,7 +15,7 @@ from trajcli.geometry.paths.chain import Chain, Corner, join
 from trajcli.geometry.paths.pose import PoseCurve
 from trajcli.kinematics.following.tool_path import ToolPath
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import Flaw, Number, refuse
+from trajcli.language.numbers import Flaw, Number, refuse_flaws
 from trajcli.language.recorded import RecordedPoses
 from trajcli.language.targets import Target
 from trajcli.planners.planner import Event
@@ -98,9 +98,7 @@ class PathMove(WovenMove):
 
     @model_validator(mode="after")
     def _corners_fit(self) -> PathMove:
-        flaws = list(self._flaws())
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws(self._flaws())
         return self
 
     def _flaws(self) -> Iterator[Flaw]:

@@ -33,6 +33,7 @@ from trajcli.language.numbers import (
     flaws_below,
     object_schema,
     refuse,
+    refuse_flaws,
     shown,
 )
 from trajcli.language.points import ListOrRecorded, NamedTarget
@@ -92,9 +93,8 @@ class Segment(Model):
     def _is_one(self) -> Segment:
         if (self.line is None) == (self.arc is None):
             raise refuse([((), "a segment is either a `line` or an `arc`", None)])
-        flaws = [] if self.line is None else list(flaws_of_target(self.line, ("line",), "a segment"))
-        if flaws:
-            raise refuse(flaws)
+        if self.line is not None:
+            refuse_flaws(flaws_of_target(self.line, ("line",), "a segment"))
         return self
 
 

@@ -23,7 +23,7 @@ from trajcli.language.numbers import (
     Flaw,
     Number,
     ReadingContext,
-    refuse,
+    refuse_flaws,
 )
 from trajcli.language.per_joint import read_each
 from trajcli.language.recorded import Recorded
@@ -167,9 +167,7 @@ class Blends(ThroughPoints):
 
     @model_validator(mode="after")
     def _blends_fit(self) -> Blends:
-        flaws = [*self._flaws_of_blends(), *self._flaws_of_points()]
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws([*self._flaws_of_blends(), *self._flaws_of_points()])
         return self
 
     def _flaws_of_blends(self) -> Iterator[Flaw]:
@@ -201,9 +199,7 @@ class Blends(ThroughPoints):
             yield (), "blends of points need points with times", "give every waypoint a `time`"
 
     def _flaws_of_points(self) -> Iterator[Flaw]:
-        for k, point in enumerate(self.listed):
-            last = k == len(self.listed) - 1
-            path = ("to",) if self.to is not None and last else ("through", k)
+        for path, point, last in self._numbered():
             if any(point.acceleration or ()) or (any(point.velocity or ()) and not last):
                 name = "velocity" if any(point.velocity or ()) and not last else "acceleration"
                 yield (*path, name), f"blends compute the {name} at the points", "leave it out, or use spline"

@@ -13,7 +13,7 @@ from trajcli.curves.splines.hermite import ShapeError
 from trajcli.curves.splines.virtual_points import virtual_points
 from trajcli.errors import Amount, PlanningError, of_joint
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import FieldPath, Flaw, refuse
+from trajcli.language.numbers import FieldPath, Flaw, refuse_flaws
 from trajcli.language.recorded import Recorded
 from trajcli.language.targets import Numbers
 from trajcli.language.waypoints import Waypoint
@@ -74,14 +74,14 @@ class Spline(ThroughPoints):
 
     @model_validator(mode="after")
     def _says_what_the_rule_needs(self) -> Spline:
-        flaws = [
-            *self._flaws_inside(),
-            *self._flaws_of_blends(),
-            *self._flaws_of_target(),
-            *self._flaws_of_virtual_times(),
-        ]
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws(
+            [
+                *self._flaws_inside(),
+                *self._flaws_of_blends(),
+                *self._flaws_of_target(),
+                *self._flaws_of_virtual_times(),
+            ]
+        )
         return self
 
     def _flaws_inside(self) -> Iterator[Flaw]:
@@ -104,10 +104,8 @@ class Spline(ThroughPoints):
                     )
 
     def _flaws_of_blends(self) -> Iterator[Flaw]:
-        for k, point in enumerate(self.listed):
+        for path, point, _ in self._numbered():
             if point.blend is not None:
-                last = self.to is not None and k == len(self.listed) - 1
-                path: FieldPath = ("to",) if last else ("through", k)
                 yield (*path, "blend"), "a spline goes through its points", "use blends, or leave it out"
 
     def _flaws_of_target(self) -> Iterator[Flaw]:

@@ -15,7 +15,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
-from trajcli.language.numbers import Flaw, refuse
+from trajcli.language.numbers import FieldPath, Flaw, refuse, refuse_flaws
 from trajcli.language.recorded import SAME_POSITION, Recorded
 from trajcli.language.targets import Duration, Target
 from trajcli.language.waypoints import NamedWaypoint, Through, Waypoint
@@ -93,6 +93,12 @@ class PointSequence(Planner):
         points = () if isinstance(self.through, Recorded) else self.through
         return points if self.to is None else (*points, self.to)
 
+    def _numbered(self) -> Iterator[tuple[FieldPath, Waypoint, bool]]:
+        """Yield where each of these points stands in the move, the point, and whether it is the last."""
+        for k, point in enumerate(self.listed):
+            last = k == len(self.listed) - 1
+            yield ("to",) if last and self.to is not None else ("through", k), point, last
+
     @property
     def target(self) -> Target | None:
         """The last of the points; None where they are recorded."""
@@ -115,12 +121,11 @@ class PointSequence(Planner):
         recorded = isinstance(self.through, Recorded)
         near = self.through.positions[-1] if isinstance(self.through, Recorded) else near
         points = []
-        for index, point in enumerate(self.listed):
+        for path, point, _ in self._numbered():
             try:
                 resolved = resolve(point, near)
             except TrajcliError as error:
-                last = self.to is not None and index == len(self.listed) - 1
-                raise _of_point(error, "target" if last else f"waypoint {index}") from None
+                raise _of_point(error, "target" if path == ("to",) else f"waypoint {path[-1]}") from None
             near = resolved.as_state().position
             points.append(_placed(point, resolved))
         if self.to is None:
@@ -155,8 +160,7 @@ class ThroughPoints(PointSequence):
         flaws = [*self._lone_time()]
         if self.timed:
             flaws += [*self._lacking_times(), *self._disordered_times()]
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws(flaws)
         return self
 
     def _lone_time(self) -> Iterator[Flaw]:

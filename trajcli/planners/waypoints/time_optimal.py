@@ -25,7 +25,7 @@ from trajcli.language.numbers import (
     FlawError,
     ReadingContext,
     number_schema,
-    refuse,
+    refuse_flaws,
     shown,
 )
 from trajcli.language.per_joint import JointDistance
@@ -137,9 +137,7 @@ class TimeOptimal(ThroughPoints):
 
     @model_validator(mode="after")
     def _path_fits(self) -> TimeOptimal:
-        flaws = [*self._flaws_of_path(), *self._flaws_of_points()]
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws([*self._flaws_of_path(), *self._flaws_of_points()])
         return self
 
     def _flaws_of_path(self) -> Iterator[Flaw]:
@@ -161,9 +159,7 @@ class TimeOptimal(ThroughPoints):
             yield ("parameter",), text, None
 
     def _flaws_of_points(self) -> Iterator[Flaw]:
-        for k, point in enumerate(self.listed):
-            last = k == len(self.listed) - 1
-            path = ("to",) if self.to is not None and last else ("through", k)
+        for path, point, last in self._numbered():
             if point.time is not None:
                 yield (*path, "time"), "time_optimal finds the times", "leave it out, or use spline"
             if point.blend is not None:

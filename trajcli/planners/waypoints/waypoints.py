@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
@@ -22,7 +22,7 @@ from trajcli.language.numbers import (
     Number,
     ReadingContext,
     number_schema,
-    refuse,
+    refuse_flaws,
     shown,
 )
 from trajcli.language.per_joint import read_each
@@ -137,9 +137,7 @@ class FastestThroughPoints(PointSequence):
 
     @model_validator(mode="after")
     def _points_fit(self) -> FastestThroughPoints:
-        flaws = [*self._flaws_of_times(), *self._flaws_of_points()]
-        if flaws:
-            raise refuse(flaws)
+        refuse_flaws([*self._flaws_of_times(), *self._flaws_of_points()])
         return self
 
     def _flaws_of_times(self) -> Iterator[Flaw]:
@@ -150,9 +148,7 @@ class FastestThroughPoints(PointSequence):
         yield ("minimum_durations",), text, None
 
     def _flaws_of_points(self) -> Iterator[Flaw]:
-        for k, point in enumerate(self.listed):
-            last = k == len(self.listed) - 1
-            path: Sequence[str | int] = ("to",) if self.to is not None and last else ("through", k)
+        for path, point, _ in self._numbered():
             if point.time is not None:
                 yield (*path, "time"), "waypoints finds the times", "leave it out, or use spline"
             if point.blend is not None:
