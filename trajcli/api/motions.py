@@ -19,7 +19,7 @@ from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
-from trajcli.streams.reading import holds_motion
+from trajcli.streams.reading import holds_motion, read_table
 from trajcli.streams.whole_file import whole_file
 
 if TYPE_CHECKING:
@@ -196,7 +196,6 @@ def plot(
     from trajcli.plots.choice import parse_quantities
     from trajcli.plots.picture import picture_of
     from trajcli.plots.write import format_of_picture, rendered
-    from trajcli.streams.reading import read_table
 
     kind = format_of_picture(str(output), None)
     plan = None if _is_motion(source) else _plan_of(source)

@@ -16,7 +16,7 @@ from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.job.report import Report
 from trajcli.job.robot import load_sheet
 from trajcli.kinematics.robot import Limits, Robot
-from trajcli.output.delivery.delivered import delivered
+from trajcli.output.delivery.delivered import delivered, report_as_delivered
 from trajcli.planning.plan import Plan
 
 if TYPE_CHECKING:
@@ -60,8 +60,6 @@ class PlannedJob(Plan):
 
     def report(self) -> Report:
         """Return the report, as `trajcli plan --report` writes it beside rows as CSV."""
-        from trajcli.output.delivery.delivered import report_as_delivered
-
         return report_as_delivered(self)
 
     def _repr_svg_(self) -> str:

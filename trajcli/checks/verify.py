@@ -11,14 +11,22 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from trajcli.checks.continuity import AccelerationSteps, acceleration_steps, check_continuity
-from trajcli.checks.target import check_targets
+from trajcli.checks.target import check_targets, check_waypoints
 from trajcli.curves.extrema import IntervalPeaks
 from trajcli.errors import at_least
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import QUANTITIES, Limits, ToolLimits
 from trajcli.limits.joints import JointSurvey, moves_over, numbered, peaks_by_move
-from trajcli.limits.kinds import KIND_OF, LimitedMove, LimitSurvey, families, family
+from trajcli.limits.kinds import (
+    KIND_OF,
+    LimitedMove,
+    LimitSurvey,
+    check_flown,
+    families,
+    family,
+    limited_part,
+)
 from trajcli.limits.tolerances import LIMIT_RELATIVE, TOOL_RELATIVE
 from trajcli.trajectory import Promise, Span, Trajectory
 
@@ -126,8 +134,6 @@ def verify(
         findings += check_targets(trajectory, promises)
         findings += _check_tools(tools)
         if any(promise.parts for promise in promises):
-            from trajcli.limits.kinds import check_flown
-
             findings += check_flown(trajectory, promises)
     return Verdict(
         findings=_in_order(trajectory, findings, promises),
@@ -319,8 +325,6 @@ def longest_factor(findings: Sequence[Finding]) -> float | None:
 def _check_via_points(trajectory: Trajectory, promises: Sequence[Promise]) -> Sequence[Finding]:
     if all(promise.via_points is None for promise in promises):
         return ()
-    from trajcli.checks.target import check_waypoints
-
     return check_waypoints(trajectory, [promise.via_points for promise in promises])
 
 
@@ -331,8 +335,6 @@ def _tools(moves: Sequence[LimitedMove], promises: Sequence[Promise]) -> Iterato
             continue
         parts = [move := moves[k]]
         if promise.parts:
-            from trajcli.limits.kinds import limited_part
-
             flown = (limited_part(move.trajectory, move.span, part) for part in promise.parts)
             parts = [part for part in flown if part.span.duration > 0]
         for part in parts:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, get_args
 
 from trajcli.batches.jobs import BatchJobs, Ledgers, find_jobs
 from trajcli.batches.task import BatchSetup, JobOutcome, OutcomeName, Setup, Task
-from trajcli.cli.frames import problem_as_json
+from trajcli.cli.frames import problem_as_json, shown
 from trajcli.cli.outcome import ErrorForm, print_remark, report_error
 from trajcli.cli.progress import ERASE, columns, is_terminal
 from trajcli.errors import FileError, InputError, PlanningError, TrajcliError, VerificationError, utf8
@@ -144,7 +144,6 @@ def _print_outcomes(
 
 def _in_words(outcome: JobOutcome, progress: Progress) -> str:
     """Return an outcome as a line of a terminal: its word with a colour, the job, how long its motion is."""
-    from trajcli.cli.frames import shown
     from trajcli.cli.terminal import GREEN, RED, painted, shortened
 
     lasts = "" if outcome.duration is None else f"{outcome.duration:.6g} s"

@@ -13,7 +13,7 @@ from trajcli.errors import InputError, PlanningError, Problem
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Robot
 from trajcli.language.poses import Configuration
-from trajcli.language.targets import Target
+from trajcli.language.targets import Target, ik_target
 from trajcli.planners.planner import Event
 
 if TYPE_CHECKING:
@@ -75,7 +75,6 @@ def resolve_pose(target: Target, robot: Robot, near: Array) -> tuple[Target, Res
 def _on_nearest_branch(target: Target, robot: Robot, near: Array) -> ResolvedPose:
     from trajcli.kinematics.inverse.solutions import check_reachable
     from trajcli.kinematics.inverse.solve import reached_if_turned, solve
-    from trajcli.language.targets import ik_target
 
     wanted = ik_target(target)
     moving = robot

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from trajcli.columns import EFFORT, JOINT_GROUPS
 from trajcli.errors import InputError
@@ -39,15 +39,21 @@ def parse_quantities(text: str) -> tuple[str, ...]:
         InputError: When one is unknown, or stands there twice, or there is none.
     """
     names = split_names([text])
-    for index, name in enumerate(names):
-        if name not in QUANTITY_NAMES:
-            hint = did_you_mean(name, QUANTITY_NAMES) or valid_names(QUANTITY_NAMES, "there are")
-            raise InputError(f"there is no quantity '{name}' to plot", hint=hint)
-        if name in names[:index]:
-            raise InputError(f"the quantity '{name}' is asked for twice", hint="name it once")
+    _check_names(names, QUANTITY_NAMES, ("quantity", " to plot"), "there are")
     if not names:
         raise InputError("no quantities are asked for", hint=valid_names(QUANTITY_NAMES, "there are"))
     return tuple(name for name in QUANTITY_NAMES if name in names)
+
+
+def _check_names(names: Sequence[str], valid: Collection[str], what: tuple[str, str], there: str) -> None:
+    """Refuse names of things, such as ("joint", ""), that are none of the valid ones, or stand twice."""
+    kind, use = what
+    for index, name in enumerate(names):
+        if name not in valid:
+            hint = did_you_mean(name, valid) or valid_names(valid, there)
+            raise InputError(f"there is no {kind} '{name}'{use}", hint=hint)
+        if name in names[:index]:
+            raise InputError(f"the {kind} '{name}' is asked for twice", hint="name it once")
 
 
 def choose_joints(names: Sequence[str], joints: Sequence[str]) -> tuple[int, ...]:
@@ -56,12 +62,7 @@ def choose_joints(names: Sequence[str], joints: Sequence[str]) -> tuple[int, ...
     Raises:
         InputError: When there is no such joint, or one is named twice.
     """
-    for index, name in enumerate(names):
-        if name not in joints:
-            hint = did_you_mean(name, joints) or valid_names(joints, "the joints are")
-            raise InputError(f"there is no joint '{name}'", hint=hint)
-        if name in names[:index]:
-            raise InputError(f"the joint '{name}' is asked for twice", hint="name it once")
+    _check_names(names, joints, ("joint", ""), "the joints are")
     return tuple(index for index, name in enumerate(joints) if not names or name in names)
 
 

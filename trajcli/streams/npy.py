@@ -80,7 +80,7 @@ class ArrayFile:
                     message = f"{self._source.file} is cut: it has {found} of {self._rows} rows"
                     raise InputError(message)
                 rows = self._numbers(np.frombuffer(data, self._dtype))[:, list(taken)]
-                self._refuse_not_finite(rows, taken, done)
+                _refuse_not_finite(rows, [self.named.names[k] for k in taken], self._source.file, done)
                 yield rows
                 done += count
 
@@ -94,14 +94,6 @@ class ArrayFile:
         parts = [data[name].reshape(len(data), -1).astype(np.float64) for name in self._dtype.names or ()]
         return np.concatenate(parts, axis=1)
 
-    def _refuse_not_finite(self, rows: Array, taken: Sequence[int], before: int) -> None:
-        finite = np.isfinite(rows)
-        if not finite.all():
-            row, column = np.argwhere(~finite)[0].tolist()
-            name = self.named.names[taken[column]]
-            message = f"{self._source.file}: {name} is {rows[row, column]} in row {before + row + 1}"
-            raise InputError(message, hint="expected finite numbers")
-
     def _field_names(self) -> tuple[list[str], Array, list[str]]:
         """Return the names of the columns of a structured array; a field of several numbers has one each."""
         names, shares = list[str](), list[float]()
@@ -112,6 +104,14 @@ class ArrayFile:
         if not 1 <= len(self._shape) <= 2 or min(self._shape) < 1:
             raise InputError(f"{self._source.file}: a structured array of shape {self._shape}", hint=_LAYOUT)
         return names, np.array(shares), _note_on_chunks(self._shape)
+
+
+def _refuse_not_finite(rows: Array, names: Sequence[str], file: str, before: int) -> None:
+    finite = np.isfinite(rows)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0].tolist()
+        message = f"{file}: {names[column]} is {rows[row, column]} in row {before + row + 1}"
+        raise InputError(message, hint="expected finite numbers")
 
 
 def _names_of(field: str, shape: Sequence[int]) -> list[str]:
@@ -209,11 +209,7 @@ def _rows_of(
     notes: Sequence[str],
 ) -> ArrayRows:
     numbers = columns.astype(np.float64)
-    finite = np.isfinite(numbers)
-    if not finite.all():
-        row, column = np.argwhere(~finite)[0].tolist()
-        message = f"{file}: {names[column]} is {numbers[row, column]} in row {row + 1}"
-        raise InputError(message, hint="expected finite numbers")
+    _refuse_not_finite(numbers, names, file, 0)
     named = NamedFile(file, tuple(names), unplaced)
     exact = np.full(len(names), EXACT, np.int64)
     return ArrayRows(form, named, numbers, exact, np.array(shares), notes=tuple(notes))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +34,17 @@ def read_recording(path: str, document: Document, robot: Robot) -> Recorded:
         FileError: When it cannot be read; with the place of its name in the job.
         FlawError: When it is not as it should be.
     """
-    try:
+    with _of_job(path, document, "through"):
         return _recorded(read_csv(Path(document.file).parent / path), robot)
+
+
+@contextmanager
+def _of_job(path: str, document: Document, field: str) -> Iterator[None]:
+    """Place what is wrong with a file where a field of a move of the job names it."""
+    try:
+        yield
     except FileError as error:
-        raise error.located(place=document.place(named_at(document, path, "through"))) from None
+        raise error.located(place=document.place(named_at(document, path, field))) from None
     except InputError as error:
         flaws = "; ".join(map(placed_text, error.problems))
         raise FlawError(flaws, "csv", hint=error.problems[0].hint) from None
@@ -62,7 +71,8 @@ def placed_text(problem: Problem) -> str:
 def _recorded(table: Table, robot: Robot) -> Recorded:
     positions = joint_values(table, robot)
     if "t" not in table.names:
-        _refuse_other_times(table)
+        hint = "call it t, with its values in s; or remove it: times are then found from the limits"
+        _refuse_others(table, _OF_TIME, "times stand in the column t, in s", hint)
         return Recorded(positions, file=table.file)
     times = table.column("t")
     late = np.flatnonzero(np.diff(times) <= 0)
@@ -99,14 +109,11 @@ def refuse_large(values: Array, table: Table) -> None:
         raise InputError(text, hint="check its exponent and unit")
 
 
-def _refuse_other_times(table: Table) -> None:
-    """Refuse times under another name: the points would be passed at other times, and nobody would notice."""
-    other = next((name for name in table.names if _OF_TIME.fullmatch(name.lower())), None)
+def _refuse_others(table: Table, pattern: re.Pattern[str], where: str, hint: str) -> None:
+    """Refuse columns under other names than they are read by: nobody would notice that they are not."""
+    other = next((name for name in table.names if pattern.fullmatch(name.lower())), None)
     if other is not None:
-        raise InputError(
-            f"{table.file}: times stand in the column t, in s; this file has '{other}'",
-            hint="call it t, with its values in s; or remove it: times are then found from the limits",
-        )
+        raise InputError(f"{table.file}: {where}; this file has '{other}'", hint=hint)
 
 
 _LENGTHS, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
@@ -124,14 +131,9 @@ def read_poses(path: str, document: Document) -> RecordedPoses:
         FileError: When it cannot be read; with the place of its name in the job.
         FlawError: When it is not as it should be.
     """
-    try:
+    with _of_job(path, document, "segments"):
         table = read_csv(Path(document.file).parent / path)
         return RecordedPoses(_positions(table), _quaternions(table), table.file)
-    except FileError as error:
-        raise error.located(place=document.place(named_at(document, path, "segments"))) from None
-    except InputError as error:
-        flaws = "; ".join(map(placed_text, error.problems))
-        raise FlawError(flaws, "csv", hint=error.problems[0].hint) from None
 
 
 def _positions(table: Table) -> Array:
@@ -151,21 +153,12 @@ def _length(table: Table, name: str) -> Array:
     return np.asarray(table.column(found[0][0]) * found[0][1])
 
 
-def _refuse_other_turns(table: Table) -> None:
-    """Refuse an orientation under other names: the tool would keep its own, and nobody would notice."""
-    other = next((name for name in table.names if _OF_TURN.fullmatch(name.lower())), None)
-    if other is not None:
-        raise InputError(
-            f"{table.file}: orientations stand in the columns qw, qx, qy, qz; this file has '{other}'",
-            hint="write them so; or remove it: the orientation is then kept",
-        )
-
-
 def _quaternions(table: Table) -> Array | None:
     """Return unit quaternions (m, 4), w first; None where there are no such columns."""
     present = [name for name in _QUATERNION if name in table.names]
     if not present:
-        _refuse_other_turns(table)
+        hint = "write them so; or remove it: the orientation is then kept"
+        _refuse_others(table, _OF_TURN, "orientations stand in the columns qw, qx, qy, qz", hint)
         return None
     if len(present) < len(_QUATERNION):
         lacking = ", ".join(name for name in _QUATERNION if name not in present)
