@@ -185,3 +185,40 @@ def test_problems_of_errors(kind: type[TrajcliError], rule: str) -> None:
 @pytest.mark.parametrize("form", ["github", "junit", "sarif"])
 def test_texts_end_in_a_line_feed(form: AnnotationForm) -> None:
     assert render_annotations([PLACED], form).endswith("\n")
+
+
+@pytest.mark.parametrize("text", ["100%0A", "%25", "a%2Cb%3Ac", "50%"])
+def test_what_looks_like_an_escape_of_the_runner_is_none(text: str) -> None:
+    (line,) = render_annotations([Problem(text, place=Place(text, 1, 0), kind=text)], "github").splitlines()
+    assert command(line) == ("error", {"file": text, "line": "1", "title": f"trajcli: {text}"}, text)
+
+
+@pytest.mark.parametrize(("text", "added"), [("row 12 is late", True), ("row 1 is late", False)])
+def test_a_row_is_told_unless_the_message_names_that_one(text: str, *, added: bool) -> None:
+    (line,) = render_annotations([Problem(text, row=1, kind="time")], "github").splitlines()
+    assert command(line)[2] == text + " (row 1)" * added
+
+
+def test_a_problem_of_no_kind_is_a_bug() -> None:
+    assert command(render_annotations([Problem("odd")], "github").strip())[1] == {"title": "trajcli: bug"}
+    assert cases(render_annotations([Problem("odd")], "junit")) == [("trajcli", "bug", ["odd"])]
+    assert [result["ruleId"] for result in sarif(Problem("odd"))["results"]] == ["bug"]
+
+
+def test_junit_of_nothing_has_one_case_that_passes() -> None:
+    """Services take a document without cases for a run that has failed."""
+    assert cases(render_annotations([], "junit")) == [("trajcli", "verification", [])]
+
+
+def test_junit_names_no_line_of_a_whole_file() -> None:
+    root = ET.fromstring(render_annotations([NOTED], "junit").encode())
+    (said,) = root.iter("system-out")
+    assert said.text == "note: snapped to 1 ms (row 12)"
+
+
+def test_sarif_counts_columns_in_characters_and_names_standard_input() -> None:
+    """Of a name that is no text, what is none is shown as its escape."""
+    run = sarif(*(Problem("m", place=Place(file, 2, 3), kind="input") for file in ("-", "a\udcff.yaml")))
+    assert run["columnKind"] == "unicodeCodePoints"
+    places = [result["locations"][0]["physicalLocation"] for result in run["results"]]
+    assert [unquote(place["artifactLocation"]["uri"]) for place in places] == ["stdin", r"a\udcff.yaml"]
