@@ -106,6 +106,28 @@ def test_rows_that_are_too_many_to_be_kept_are_read_anew(
     assert found.rows == 10
 
 
+def lines_of(folder: Path, rows: list[list[float]]) -> Path:
+    """Write rows as JSON lines, which are read 4096 at a time."""
+    path = folder / "rows.jsonl"
+    path.write_text("".join(f'{{"t": {t}, "q": [{a}, {b}]}}\n' for t, a, b in rows), encoding="utf-8")
+    return path
+
+
+def test_rows_of_all_blocks_say_the_rounding_and_how_many_there_are(tmp_path: Path) -> None:
+    """A joint that moves in the first block alone is none that stands, and has decimals of its own."""
+    rows = [[k / 100, 0.5 * (k % 2) if k < 4000 else 0.5, 0.123456 * (k % 2)] for k in range(5000)]
+    found = open_motion(lines_of(tmp_path, rows))
+    assert (found.rows, found.whole().q.shape) == (5000, (5000, 2))
+    assert found.resolution.q.tolist() == pytest.approx([0.05, 5e-7])
+
+
+def test_the_first_number_that_no_motion_has_is_told_in_whatever_block(tmp_path: Path) -> None:
+    rows = [[k / 100, 1e101 if k == 4600 else 0.0, -1e102 if k in (4500, 4700) else 0.0] for k in range(5000)]
+    with pytest.raises(InputError) as caught:
+        open_motion(lines_of(tmp_path, rows))
+    assert "q2 is -1e+102 in row 4501" in caught.value.problems[0].message
+
+
 def test_binary_stamps_are_as_exact_as_their_last_bit(tmp_path: Path) -> None:
     """Since 1970 a float64 tells 2.4e-7 s apart; nine decimals of it say no more than that."""
     rows = [[f"{1.7e9 + k / 100:.9f}", 0.5 * k] for k in range(5)]
@@ -165,6 +187,7 @@ def test_joints_of_a_message_are_all_named_whichever_are_read(tmp_path: Path) ->
     goal.write_text(f"joint_names: [a, b, c]\npoints:\n{states}")
     found = open_motion(goal, joints=("c", "a"), declared=Units(angle="deg"))
     whole = found.whole()
+    assert found.notes == ("joints that are not of the robot: b",)
     assert (whole.joints, whole.message_joints) == (("c", "a"), ("a", "b", "c"))
     assert whole.q.tolist() == [[k + 0.5, k] for k in range(3)]
     rows = written(tmp_path, "t,a_position,b_position", [[0, 1, 2], [1, 1.5, 2.5]])
