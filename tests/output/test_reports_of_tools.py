@@ -181,7 +181,9 @@ def test_of_findings_of_one_cause_the_worst_is_told_with_how_many_there_are() ->
     assert len(every) == len(plan.verdict.findings) > 2
     worst = verification_error(plan, every=False).problems
     others = len(every) - len(worst)
-    counts = [problem.text().rpartition(" (and ")[2] for problem in worst if "like it: --all)" in problem.text()]
+    counts = [
+        problem.text().rpartition(" (and ")[2] for problem in worst if "like it: --all)" in problem.text()
+    ]
     assert sum(int(text.split()[0]) for text in counts) == others > 0
 
 

@@ -18,8 +18,9 @@ from trajcli.errors import InputError, VerificationError
 from trajcli.job.read import job_from_text
 from trajcli.output.delivery.joined import write_plan
 from trajcli.output.recording import LogOptions
-from trajcli.output.write import grid_of, write_rows
+from trajcli.output.write import grid_of, points_of, write_rows
 from trajcli.planning.plan import Plan, plan_job
+from trajcli.progress import listening
 from trajcli.streams.formats import FORMATS
 
 JOB: dict[str, Any] = {
@@ -211,3 +212,72 @@ def test_a_plan_that_breaks_a_limit_is_not_written(tmp_path: Path) -> None:
     assert [*tmp_path.iterdir()] == []
     write_plan(planned(), str(tmp_path / "a.csv"), "full")
     assert len(table(tmp_path / "a.csv")["t"]) == grid_of(planned()).count
+
+
+def test_the_name_of_standard_output_makes_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    plan = planned(rate=10)
+    write_rows(plan, grid_of(plan), "-", "fixed")
+    found = capfdbinary.readouterr().out
+    assert found == delivered(plan, tmp_path / "rows.csv").read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.csv"]
+
+
+def test_points_and_progress_count_all_rows_of_many(tmp_path: Path) -> None:
+    """More than are evaluated at a time."""
+    plan = planned(rate=5000, rows="rate", columns=["t", "q"])
+    many = grid_of(plan)
+    assert len(list(many.blocks())) > 1
+    points = points_of(plan, many)
+    assert points.nanoseconds.size == many.count
+    at = np.append(np.arange(many.count - 1) / 5000, plan.trajectory.duration)
+    assert points.nanoseconds.tolist() == np.rint(at * 1e9).astype(int).tolist()
+    said: list[str] = []
+    with listening(said.append):
+        delivered(plan, tmp_path / "rows.npy")
+    last = [text for text in said if text.startswith("writing row ")][-1]
+    assert last == f"writing row {many.count} of {many.count}"
+
+
+ARM: dict[str, Any] = {
+    "version": 1,
+    "robot": {
+        "joints": [
+            {"a": 1, "link": {"mass": 2, "com": [-0.5, 0, 0], "inertia": [0.1, 0.1, 0.1, 0, 0, 0]}},
+            {"a": 0.5, "link": {"mass": 1, "com": [-0.25, 0, 0], "inertia": [0.1, 0.1, 0.1, 0, 0, 0]}},
+        ],
+        "convention": "standard",
+        "base": {"xyz": [0, 0, 7], "rpy": [1.5, 0, 0]},
+    },
+    "units": {"angle": "rad", "length": "m"},
+    "start": {"joints": [0.25, 0.5]},
+    "moves": [{"planner": "quintic", "to": {"joints": [1.0, -0.5]}, "duration": 2}],
+}
+
+
+def test_a_log_has_efforts_where_the_job_asks_for_them(tmp_path: Path) -> None:
+    output = {"rate": 20, "columns": ["t", "q", "qd", "qdd", "tau"]}
+    plan = _planned(json.dumps({**ARM, "output": output}))
+    rows = table(delivered(plan, tmp_path / "rows.csv"))
+    efforts = read_mcap(delivered(plan, tmp_path / "log.mcap")).effort
+    assert efforts == pytest.approx(np.stack([rows["tau1"], rows["tau2"]], axis=1), abs=1e-8)
+    assert np.abs(efforts).max() > 1.0
+    bare = _planned(json.dumps({**ARM, "output": {**output, "columns": ["t", "q"]}}))
+    assert read_mcap(delivered(bare, tmp_path / "bare.mcap")).effort.shape == (41, 0)
+    with pytest.raises(InputError):
+        delivered(planned(rate=10), tmp_path / "none.mcap", log=LogOptions(topics="/tool_twist"))
+    assert not (tmp_path / "none.mcap").exists()
+
+
+@pytest.mark.parametrize("frame", ["base", "world"])
+def test_rows_say_where_the_tool_is_in_the_frame_that_the_job_names(frame: str, tmp_path: Path) -> None:
+    """The base lies on its side 7 m above the floor: about the x axis of world."""
+    plan = _planned(json.dumps({**ARM, "output": {"rate": 20, "columns": ["t", "q", "pose"], "in": frame}}))
+    rows = table(delivered(plan, tmp_path / "rows.csv"))
+    angle = np.cumsum([rows["q1"], rows["q2"]], axis=0)
+    x, y = np.cos(angle[0]) + 0.5 * np.cos(angle[1]), np.sin(angle[0]) + 0.5 * np.sin(angle[1])
+    places = {"base": (x, y, 0 * y), "world": (x, np.cos(1.5) * y, 7 + np.sin(1.5) * y)}
+    found = np.stack([rows["x"], rows["y"], rows["z"]])
+    assert found == pytest.approx(np.stack(places[frame]), abs=1e-8)

@@ -51,6 +51,8 @@ def indented(text: str, by: str) -> str:
         "{0}",
         "\ufeff{0}",
         "# a word\n---\n{0}",
+        "\ufeff# a word\n---\n{0}",
+        "%YAML 1.1\n---\n{0}",
         "{0}---\njoint_names: [c]\npoints: []\n",
         "{0}...\n",
         "goal:\n  trajectory:\n{4}",
@@ -93,3 +95,29 @@ def test_what_is_no_message_is_refused(tmp_path: Path, text: str, said: str) -> 
         read(tmp_path / "a.yaml", text)
     (problem,) = caught.value.problems
     assert said in f"{problem.message} ({problem.hint})"
+
+
+@pytest.mark.parametrize("gap", ["", "\n", "\n\n\n", "  \n\n"])
+@pytest.mark.parametrize("dash", ["- ", "  - "])
+def test_the_line_at_which_a_message_is_cut_is_told(tmp_path: Path, gap: str, dash: str) -> None:
+    text = f"{message()}{gap}{dash}'...'\n"
+    with pytest.raises(InputError, match="the message is cut") as caught:
+        read(tmp_path / "a.yaml", text)
+    place = caught.value.problems[0].place
+    assert place is not None
+    assert text.splitlines()[place.line - 1].strip() == "- '...'"
+
+
+def test_what_is_no_yaml_is_told_at_its_place(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is no YAML") as caught:
+        read(tmp_path / "a.yaml", "joint_names: [a]\npoints: @\n")
+    place = caught.value.problems[0].place
+    assert place is not None
+    assert (place.line, place.column) == (2, 9)
+
+
+def test_numbers_with_exponents_alone_are_numbers_with_any_sign(tmp_path: Path) -> None:
+    """As ROS 1 prints them, without a point."""
+    found = read(tmp_path / "a.yaml", message(first="[-1e-05, 1e-05]", last="[+1e1, -5e+0]"))
+    assert found.position.tolist() == [[-1e-05, 1e-05], [10.0, -5.0]]
+    assert found.decimals[1:].tolist() == [5, 5]

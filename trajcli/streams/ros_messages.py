@@ -8,6 +8,7 @@ they were written with.
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from math import isfinite
@@ -75,7 +76,7 @@ def read_ros_yaml(source: str | Path | ByteSource) -> JointMessage:
     text = _text(bytes_of)
     cut = _CUT.search(text)
     if cut is not None and "'...'" in cut[0]:
-        line = text.count("\n", 0, cut.start()) + 1 + cut[0].startswith("\n")
+        line = text.count("\n", 0, text.index("'...'", cut.start())) + 1
         place = Place(file, line, 1, cut[0].strip())
         hint = "print it again with `ros2 topic echo --full-length`"
         raise InputError(Problem("the message is cut: long arrays end in '...'", hint, place))
@@ -89,6 +90,7 @@ def _text(source: ByteSource) -> str:
     with source.open() as stream:
         while line := stream.readline(_LARGEST + 1):
             size += len(line)
+            line = line if lines else line.removeprefix(BOM_UTF8)
             if size > _LARGEST:
                 hint = "longer motions are read from CSV, JSON lines and MCAP"
                 raise InputError(f"{source.file}: a message in YAML has at most {_LARGEST} bytes", hint=hint)
@@ -97,7 +99,7 @@ def _text(source: ByteSource) -> str:
             content = content or (bool(line.strip()) and not line.startswith((b"---", b"#", b"%")))
             lines.append(line)
     try:
-        return b"".join(lines).decode("utf-8-sig")
+        return b"".join(lines).decode()
     except UnicodeDecodeError as error:
         at = f"{error.reason} at byte {error.start}"
         raise InputError(f"{source.file} is no UTF-8 text: {at}") from error

@@ -178,3 +178,50 @@ def test_an_end_that_is_missing_is_one_error(cut: int) -> None:
         values(whole[:-cut])
     with pytest.raises(InputError, match="the file is truncated"):
         values(whole[:-8] + b"\x89MCAP1\r\n")
+
+
+def test_a_file_that_stops_inside_of_a_record_is_truncated() -> None:
+    whole = log(chunk(DATA), index(1, [AT[0], AT[2]]), record(9, bytes(60)))
+    for size in range(8, len(whole), 5):
+        with pytest.raises(InputError, match=r"a.mcap: the file is truncated, at byte \d+"):
+            values(whole[:size])
+    with pytest.raises(InputError, match="this is no MCAP file, at byte 0$"):
+        values(b"t,q1\n0,1\n" * 20)
+
+
+def test_records_of_definitions_are_short_and_others_may_be_long() -> None:
+    """A schema of two megabytes is none; a picture, a message or the index of many messages may be as long."""
+    long = MAGIC + record(1, text("ros2") + text("somebody")) + struct.pack("<BQ", 3, 2**21) + bytes(100)
+    with pytest.raises(InputError, match=f"a record claims {2**21} bytes, more than a record of its kind"):
+        values(long)
+    assert values(log(record(9, bytes(2**20 + 5)), ONE)) == [1.0]
+    assert values(log(chunk(ONE), index(1, [0] * 70_000))) == [1.0] * 70_000
+    frame = "f" * (2**20 + 3)
+    start = bytes([0, 1, 0, 0]) + struct.pack("<iI", 1, 0) + struct.pack("<I", len(frame) + 1)
+    start += frame.encode() + b"\0" + struct.pack("<II", 1, 2) + b"a\0" + bytes(2) + struct.pack("<I", 1)
+    data = start + bytes((4 - len(start)) % 8) + struct.pack("<d", 1.0) + struct.pack("<II", 0, 0)
+    assert values(log(record(5, struct.pack("<HIQQ", 1, 0, 0, 0) + data))) == [1.0]
+
+
+def test_no_compression_has_two_names() -> None:
+    assert values(log(chunk(DATA, by="none"))) == [1.0, 3.0]
+
+
+@pytest.mark.parametrize("names", [("trajcli", "others"), ("others", "trajcli")])
+@pytest.mark.parametrize("summed", [True, False])
+def test_the_epoch_is_that_of_our_metadata_wherever_others_stand(
+    names: tuple[str, str], *, summed: bool
+) -> None:
+    parts = []
+    for name in names:
+        pairs = text("epoch") + text("500000000" if name == "trajcli" else "250000000")
+        parts.append(record(12, text(name) + struct.pack("<I", len(pairs)) + pairs))
+    begin = len(log()) - len(record(15, bytes(4)) + record(2, bytes(20)) + MAGIC)
+    places = (begin, begin + len(parts[0]))
+    entries = [
+        record(13, struct.pack("<QQ", place, len(part)) + text(name))
+        for place, part, name in zip(places, parts, names, strict=True)
+    ]
+    data = log(*parts, ONE, summary=definitions() + b"".join(entries) if summed else b"")
+    (block,) = log_blocks(BytesIO(data), "a.mcap", "/1")
+    assert block.times.tolist() == [0.5]
