@@ -268,6 +268,8 @@ def test_a_log_has_efforts_where_the_job_asks_for_them(tmp_path: Path) -> None:
     assert read_mcap(delivered(bare, tmp_path / "bare.mcap")).effort.shape == (41, 0)
     with pytest.raises(InputError):
         delivered(planned(rate=10), tmp_path / "none.mcap", log=LogOptions(topics="/tool_twist"))
+    with pytest.raises(InputError, match="start"):
+        delivered(planned(rate=10, start_time=-1.0), tmp_path / "none.mcap")
     assert not (tmp_path / "none.mcap").exists()
 
 

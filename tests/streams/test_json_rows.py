@@ -162,3 +162,27 @@ def test_lists_of_texts_are_left_out_and_lists_of_unknown_numbers_refused(tmp_pa
     (tmp_path / "a.jsonl").write_text("\n \n")
     with pytest.raises(InputError, match="has no rows"):
         open_motion(tmp_path / "a.jsonl", units="rad")
+
+
+def test_what_is_wrong_with_keys_and_lines_is_told_at_its_line(tmp_path):
+    """Blank lines count; a line that is no JSON in the middle of a file says nothing of its end."""
+    path = tmp_path / "a.jsonl"
+    path.write_text('\n\n{"q": [0, 0]}\n')
+    with pytest.raises(InputError, match="no column is the time") as caught:
+        open_motion(path, units="rad")
+    assert str(caught.value.problems[0].place) == f"{path}:3:1"
+    for end, hint in (("\n" + LINE, None), ("", "the file may have been cut")):
+        path.write_text(LINE + '{"t": 1.0, "q": [0,' + end)
+        with pytest.raises(InputError, match="no JSON") as caught:
+            open_motion(path, units="rad")
+        assert caught.value.problems[0].hint == hint
+
+
+def test_a_writer_of_all_digits_rounds_nothing_whichever_key_shows_it(tmp_path):
+    """Also one that is not read."""
+    path = tmp_path / "a.jsonl"
+    path.write_text(
+        "".join(f'{{"t": {k}.5, "q": [{k}.25], "load": 0.12345678901234567}}\n' for k in range(3))
+    )
+    resolution = open_motion(path, units="rad").resolution
+    assert (resolution.time, resolution.q.tolist()) == (0.0, [0.0])

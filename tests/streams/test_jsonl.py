@@ -101,3 +101,12 @@ def test_columns_apart_of_one_group_are_not_mixed():
     out = io.BytesIO()
     with pytest.raises(TrajcliError, match="the columns q stand apart"):
         list(write_jsonl_blocks([np.zeros((1, 3))], columns, out))
+
+
+@pytest.mark.parametrize("fault", FAULTS[:6])
+def test_the_row_that_is_wrong_is_told(fault):
+    out, blocks = written(random_rows(10))
+    with pytest.raises(TrajcliError, match=r"^row 7 of the file read back"):
+        verify_jsonl(io.BytesIO(fault(out.getvalue())), blocks, COLUMNS)
+    with pytest.raises(TrajcliError, match="ends after 9 rows"):
+        verify_jsonl(io.BytesIO(out.getvalue()[:-1]), blocks, COLUMNS)

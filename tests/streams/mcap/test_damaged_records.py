@@ -185,7 +185,7 @@ def test_a_file_that_stops_inside_of_a_record_is_truncated() -> None:
     for size in range(8, len(whole), 5):
         with pytest.raises(InputError, match=r"a.mcap: the file is truncated, at byte \d+"):
             values(whole[:size])
-    with pytest.raises(InputError, match="this is no MCAP file, at byte 0$"):
+    with pytest.raises(InputError, match=r"this is no MCAP file, at byte 0$"):
         values(b"t,q1\n0,1\n" * 20)
 
 
