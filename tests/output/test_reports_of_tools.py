@@ -15,7 +15,7 @@ from trajcli.job.report import MoveReport, Report, ToolReport
 from trajcli.kinematics.forward import forward
 from trajcli.knots import knots_of
 from trajcli.output.report import concession_error, report_of, verification_error
-from trajcli.planners.planner import Event
+from trajcli.planners.planner import Certificate, Event
 from trajcli.planning.plan import Plan, plan_job
 
 HOLD = {"planner": "hold", "duration": 1.5}
@@ -78,6 +78,7 @@ def test_a_tool_that_turns_in_its_place_goes_along_an_angle() -> None:
     assert {name for name, peak in peaks.items() if peak.negligible} == {"speed", "acceleration"}
     assert peaks["angular_speed"].value == pytest.approx(np.radians(30))
     assert peaks["angular_speed"].limit == pytest.approx(np.radians(30))
+    assert all(peak.value < peak.bound < peak.value + 1e-9 for peak in tool.peaks)
 
 
 def test_a_slow_tool_moves_and_does_not_turn() -> None:
@@ -197,3 +198,48 @@ def test_who_accepts_no_concession_is_told_each_with_its_move() -> None:
     assert places == [plan.loaded.place_of_move(0), plan.loaded.place_of_move(2)]
     assert places[0] != places[1]
     assert all(problem.hint == "leave --strict out to accept it" for problem in problems)
+
+
+@pytest.mark.full
+def test_of_moves_that_fly_by_a_corner_the_tool_is_compared_at_the_times_of_its_line() -> None:
+    """Outside of the ball; at other times it would be centimetres from where its line has it."""
+    lines = [{"planner": "line", "to": {"xyz": [0.4, y, z]}} for y, z in ((-0.3, 0.3), (-0.3, 0.4))]
+    limits = {"acceleration": 800, "tcp": {"speed": 0.2, "acceleration": 2}}
+    plan, report = planned({**lines[0], "zone": 0.02}, lines[1], limits=limits)
+    assert report.flyby is not None
+    for move, line in zip(report.moves, (0.1, 0.1), strict=True):
+        tool = tool_of(move)
+        assert tool.deviation < 1e-9
+        assert tool.length == pytest.approx(line, abs=0.03)
+        t, _, rates = speeds_of(plan, move)
+        (peak,) = [each for each in tool.peaks if each.quantity == "speed"]
+        assert move.start < peak.time < move.end
+        assert np.interp(peak.time, t, rates) == pytest.approx(peak.value, rel=1e-3)
+
+
+def test_how_near_a_motion_is_to_the_fastest_is_told_with_its_joints_and_times() -> None:
+    """Of searches of which some led to none; where nothing bounds the duration, the motion is the best found."""
+    plan, _ = planned(to(1, 0.5), to(0, 0), **HINGE_AND_SLIDE)
+    first, second = plan.moves
+    off = {"off_chords": np.array([0.25, 0.5]), "off_times": np.array([1.0, 3.0])}
+    made = Certificate(3.2, 1, (4.0, np.inf, 4.5), 1, np.inf, **off)
+
+    def said(certificate: Certificate) -> Any:
+        move = replace(second, planned=replace(second.planned, certificate=certificate))
+        return report_of(replace(plan, moves=(first, move))).moves[1].fastest
+
+    found = said(made)
+    assert (found.lower, found.above, found.joint, found.method) == (
+        3.2,
+        pytest.approx(0.25),
+        "j2",
+        "bounded",
+    )
+    assert (found.starts, found.agreeing, found.found, found.stopping) == (3, 1, [4.0, None, 4.5], None)
+    chords = [(one.joint, one.distance, one.time, one.unit) for one in found.off_chords]
+    assert chords == [("j1", 0.25, 5.0, "rad"), ("j2", 0.5, 7.0, "m")]
+    assert said(replace(made, lower=4.0 * (1 + 1e-12), joint=None, stopping=5.5)).above == 0.0
+    together = said(replace(made, joint=None, stopping=5.5))
+    assert (together.joint, together.stopping) == (None, 5.5)
+    unknown = said(replace(made, lower=0.0))
+    assert (unknown.lower, unknown.above, unknown.method) == (None, None, "heuristic")

@@ -159,6 +159,10 @@ def test_lists_of_texts_are_left_out_and_lists_of_unknown_numbers_refused(tmp_pa
     with pytest.raises(InputError, match="unexpected list 'gains' of 2 numbers") as caught:
         open_motion(tmp_path / "a.jsonl", units="rad")
     assert str(caught.value.problems[0].place) == f"{tmp_path / 'a.jsonl'}:2:1"
+    for count in (3, 8):
+        (tmp_path / "a.jsonl").write_text(f'{{"t": 0, "q": [0, 0], "pose": {[0.5] * count}}}\n')
+        with pytest.raises(InputError, match=f"unexpected list 'pose' of {count} numbers"):
+            open_motion(tmp_path / "a.jsonl", units="rad")
     (tmp_path / "a.jsonl").write_text("\n \n")
     with pytest.raises(InputError, match="has no rows"):
         open_motion(tmp_path / "a.jsonl", units="rad")
