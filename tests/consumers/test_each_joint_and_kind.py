@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_faults import HOME, judged, motion, with_value
+from planted_faults import HOME, judged, motion, surroundings, with_value
+from scipy.interpolate import BPoly
 
 from trajcli.consumers.executed import approach_excesses
 from trajcli.consumers.judgement import judge_by_profile, load_profile
@@ -454,3 +455,38 @@ def test_of_points_the_first_one_is_where_the_curve_to_it_arrives() -> None:
     free, bound = np.tile([-np.inf, np.inf], (7, 1)), np.tile([-0.59, 0.59], (7, 1))
     (told,) = approach_excesses(rows, STILL[0] - 0.2 * np.eye(7)[2], Limits(free, bound, free, free))
     assert told == (2, "velocity", pytest.approx(0.6), 0.59, pytest.approx(0.25))
+
+
+@pytest.mark.parametrize("columns", ["q,qd", "q,qd,qdd"])
+@pytest.mark.parametrize("late", [0.0, 4e-7])
+@pytest.mark.parametrize(("apart", "near"), [(3e-5, True), (1.2e-3, True), (8e-3, False)])
+def test_points_so_near_that_whole_numbers_make_an_acceleration(
+    apart: float, near: bool, late: float, columns: str
+) -> None:
+    """Scipy joins the points as they are sent: beyond what the planned ones have is what was said, and no more."""
+    joint, limit = 2, 5.0
+    t = np.array([0.0, 0.5, 0.5 + apart, 1.0]) + late * np.arange(4)
+    q, qd, qdd = (np.zeros((4, 6)) for _ in range(3))
+    q[:, joint] = 0.1 + 0.6 * t - 2.0 * t**2 / 2 + 3e-7  # the third point is rounded by another amount
+    qd[:, joint], qdd[:, joint] = 0.6 - 2.0 * t, -2.0
+    rows = replace(motion(6, 0.1, 4), t=t, q=q, qd=qd, qdd=qdd)
+    rows = rows if "qdd" in columns else replace(rows, qdd=None)
+    free, bound = np.tile([-np.inf, np.inf], (6, 1)), np.tile([-limit, limit], (6, 1))
+    limits = Limits(free, free, bound, free)
+    around = replace(surroundings(6), limits=limits)
+    told = [
+        each for each in judged(rows, "ur-passthrough", around).findings if each.rule.endswith("near-points")
+    ]
+    sent = np.cumsum(np.append(0.0, np.rint(np.diff(rows.t) / 1e-6))) * 1e-6
+    names = [values for values in (rows.q, rows.qd, rows.qdd) if values is not None]
+    states = np.stack([np.rint(values[:, joint] / 1e-6) * 1e-6 for values in names], axis=1)
+    largest = 0.0
+    for k in range(3):
+        curve = BPoly.from_derivatives(sent[k : k + 2], states[k : k + 2]).derivative(2)
+        largest = max(largest, np.abs(curve(np.linspace(*sent[k : k + 2], 2001)) + 2.0).max())
+    assert bool(told) == near == (largest > 1.0)
+    for each in told:
+        assert (each.joint, each.row, each.severity) == ("joint_3", 3, "warning")
+        assert each.limit == pytest.approx(0.2 * limit)
+        # rates are rounded as well
+        assert each.value == pytest.approx(largest, rel=0.02, abs=8e-6 / apart)

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from joined_by_scipy import largest_share
+from joined_by_scipy import control_points, largest_share
 from random_jobs import loaded as job_of
+from scipy.interpolate import BPoly
 from tiers import few
 
 import trajcli
@@ -33,6 +34,7 @@ from trajcli.planners.planner import PlannedMove
 from trajcli.planners.point_to_point.whole_periods import PhasesInPeriods, profile_in_periods
 from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.plan import plan_job
+from trajcli.samples import sample
 from trajcli.streams.formats import FORMATS
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -74,6 +76,48 @@ def test_rows_keep_all_limits_as_they_are_joined(name: str, profile: str, longes
     assert (said is None) == (longer <= WITHIN)
     if said is not None:
         assert float(said[1]) == pytest.approx(100 * longer, rel=0.06)
+
+
+def test_accelerations_of_points_that_are_sent_in_whole_millionths() -> None:
+    """Knots 66 us apart would have 57 times the limit, as they are sent."""
+    made = made_for("ur5e_pick", "ur-passthrough")
+    assert made.keeps
+    assert not made.rough
+    rows = np.concatenate([*sample(made.plan.trajectory, made.grid, ("q", "qd", "qdd"))])
+    t = np.concatenate([local for _, local in made.grid.blocks()])
+    lengths = np.rint(np.diff(t) * 1e6) * 1e-6
+    curve = BPoly(
+        control_points(np.rint(rows.reshape(-1, 3, 6) * 1e6) * 1e-6, lengths),
+        np.append(0.0, lengths.cumsum()),
+    )
+    times = np.linspace(0.0, lengths.sum(), 20 * t.size)
+    limits = np.max([move.robot.limits.acceleration for move in made.plan.moves], axis=0)
+    assert (np.abs(curve.derivative(2)(times)) <= 1.2 * limits[:, 1]).all()
+
+
+def test_knots_that_were_asked_for_are_said_to_be_near() -> None:
+    loaded = load_job(str(EXAMPLES / "ur5e_pick.yaml"), ("output.rows=knots",))
+    made = plan_for(*job_for(loaded, "ur-passthrough", {"rows": True}), Writing(FORMATS["csv"]))
+    assert made.keeps
+    assert made.rough
+    assert made.rules is not None
+    found = {each.rule: each for each in made.rules.findings}["passthrough-near-points"]
+    assert re.search(r"lasts \S+e-05 s: in whole units of 1e-06 that makes", found.message)
+
+
+def test_rough_rows_are_better_than_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    job = {"robot": {"joints": 1}, "limits": {"velocity": 2, "acceleration": 9, "jerk": 99}}
+    moves = [{"planner": "jerk_limited", "to": {"joints": [1]}}]
+    text = json.dumps({"version": 1, **job, "start": {"joints": [0]}, "moves": moves, "output": {"rate": 30}})
+    arguments = job_for(job_from_text(text), "ros-jtc", {})
+    monkeypatch.setattr(ForConsumer, "rough", True)
+    with pytest.raises(VerificationError) as refused:
+        plan_for(*arguments, Writing())
+    assert "`--rows knots` keeps all limits" in str(refused.value.problems[0].advice())
+    slowed = job_for(job_from_text(text[:-1] + ', "when_over_limit": "slow"}'), "ros-jtc", {})
+    made = plan_for(*slowed, Writing())
+    assert made.keeps
+    assert made.plan.loaded.job.output.rows == "knots"
 
 
 @pytest.mark.full

@@ -14,7 +14,7 @@ from trajcli.kinematics.robot import QUANTITIES, Limits
 from trajcli.limits.tolerances import exceeds
 from trajcli.streams.recorded_motion import RecordedMotion
 
-__all__ = ["IntegerRange", "QuantisedCurve", "VelocitySteps"]
+__all__ = ["IntegerRange", "QuantisedCurve", "RoundedSegments", "VelocitySteps"]
 
 _ROUNDING = 1e-9  # relative
 
@@ -147,6 +147,51 @@ class QuantisedCurve(RuleCheck):
             }
 
         self.note_rows(rows, off > tolerance, off, fields)
+
+
+class RoundedSegments(RuleCheck):
+    """Points as whole numbers of `unit`, segments of `time_unit`: what acceleration this makes between two.
+
+    Where two points that are h apart are off against each other by e, a quintic has 10 e / (sqrt(3) h^2) of
+    it, a cubic 6 e / h^2. At most `share` of the robot's limit.
+    """
+
+    parameters: ClassVar[Mapping[str, Any]] = {"unit": None, "time_unit": None, "share": None}
+
+    _before: tuple[float, Array] | None = None
+
+    def _take(self, rows: RecordedMotion) -> None:
+        limits, unit, time_unit = self.around.limits, self.number("unit"), self.number("time_unit")
+        if rows.qd is None or limits is None or len(limits.acceleration) != rows.q.shape[1]:
+            self.unjudged = (
+                None if rows.qd is None else "the limits of the robot are not known: give a job or a robot"
+            )
+            return
+        bound = np.abs(limits.acceleration).min(axis=1)
+        time, position = self._before or (float(rows.t[0]), rows.q[0])
+        q = np.concatenate([position[None], rows.q])
+        self._before = float(rows.t[-1]), rows.q[-1]
+        steps = np.diff(rows.t, prepend=time)[:, None]
+        lasts = np.rint(steps / time_unit) * time_unit
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.abs(np.diff(np.rint(q / unit), axis=0) * unit - np.diff(q, axis=0) * (lasts / steps))
+            made = (6.0 if rows.qdd is None else 10 / 3**0.5) * off / lasts**2
+        made = np.where(lasts > 0, made, 0.0)  # a segment that becomes none is another rule's
+
+        def fields(index: int, joint: int) -> dict[str, Any]:
+            value = float(made[index, joint])
+            return {
+                "kind": "quantisation",
+                "quantity": "acceleration",
+                "value": value,
+                "limit": self.number("share") * float(bound[joint]),
+                "message": f"the segment that ends {when(rows, index)} lasts {float(steps[index, 0]):.6g} s: "
+                f"in whole units of {unit:g} that makes an acceleration of {self.joint_name(rows, joint)} "
+                f"of up to {value:.4g}, its limit is {float(bound[joint]):.6g}",
+                "hint": "put points further apart, as those of a rate are",
+            }
+
+        self.note_rows(rows, made > self.number("share") * bound, made / bound, fields)
 
 
 def approach_excesses(

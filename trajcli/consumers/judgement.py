@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from trajcli.consumers.differences import Differences, EffortRate, RoundingNoise, VelocityTowardsEnds
-from trajcli.consumers.executed import IntegerRange, QuantisedCurve, VelocitySteps
+from trajcli.consumers.executed import IntegerRange, QuantisedCurve, RoundedSegments, VelocitySteps
 from trajcli.consumers.profile import Profile, profile_names, read_profile
 from trajcli.consumers.rule_check import RuleCheck, Surroundings
 from trajcli.consumers.stamps import (
@@ -53,6 +53,7 @@ CHECKS: Mapping[str, type[RuleCheck]] = {
     "period": ControllerPeriod,
     "position_range": PositionRange,
     "quantised_curve": QuantisedCurve,
+    "rounded_segments": RoundedSegments,
     "segment_durations": SegmentDurations,
     "velocity_by_position": VelocityTowardsEnds,
     "velocity_steps": VelocitySteps,

@@ -126,6 +126,12 @@ class ForConsumer:
         return self.digits == "fixed" and self.decimal and self.rows.rounding() > _COARSE
 
     @property
+    def rough(self) -> bool:
+        """Whether the whole numbers that its consumer takes make much of a limit between near points."""
+        found = () if self.rules is None else self.rules.findings
+        return any(each.kind == "quantisation" and each.quantity for each in found)
+
+    @property
     def clean(self) -> bool:
         """Whether the rows may be written, and rounding makes nothing of them that is worth speaking of."""
         return self.keeps and not self.uses_over and not self.coarse
@@ -183,9 +189,10 @@ def plan_for(
     if not all(map(may_be_cured, first.over)):
         return replace(first, said=said)
     if loaded.job.when_over_limit == "error":
-        raise refusal(first, search.help(first))
-    other = search.other_rows(first)
-    made = search.slower(first) if other is None else other[0]
+        raise refusal(first, [*search.help(first)] or (search.help(first) if search.roughly() else ()))
+    made = search.remedy(first)
+    if not made.keeps and search.roughly():
+        made = search.remedy(first)
     return replace(made, said=(*said, *made.said))
 
 
@@ -218,6 +225,7 @@ class _Search:
         self._shortest = 0.0
         self._first: ForConsumer | None = None
         self._begun = Adaptation()  # what it knows of moves, all that are adapted know
+        self._rough, self._refused = False, False  # rough rows are taken; some were not
 
     def first(self) -> ForConsumer:
         """Return the plan as it is without its consumer; its moves are kept for what follows."""
@@ -256,13 +264,29 @@ class _Search:
             return replace(made, digits="full", chosen=True)
         return made
 
+    def roughly(self) -> bool:
+        """Take rough rows from now on, where such were refused; return whether they were."""
+        self._rough = self._refused
+        return self._rough
+
+    def remedy(self, first: ForConsumer) -> ForConsumer:
+        """Return the motion with other rows, else the shortest slower one; `first` where there is none."""
+        other = self.other_rows(first)
+        return self.slower(first) if other is None else other[0]
+
+    def _takes(self, made: ForConsumer) -> bool:
+        """Return whether rows will do; rough ones are refused first, as long as others may be found."""
+        refused = made.clean and made.rough and not self._rough
+        self._refused |= refused
+        return made.clean and not refused
+
     def other_rows(self, made: ForConsumer) -> tuple[ForConsumer, Mapping[str, Any]] | None:
         """Return the motion with other rows that the consumer takes and that keep all, and what changes."""
         for other in rows_that_keep(made.rows, self._writing.form):
             if self._profile.rows.rate is not None and {*other.output} != {"columns"}:
                 continue
             found = self.judged(replace(made.plan, loaded=made.plan.loaded.with_output(other.output)))
-            if found.clean:
+            if self._takes(found):
                 words = " and ".join(
                     f"columns {', '.join(value)}"
                     if key == "columns"
@@ -302,12 +326,13 @@ class _Search:
         job = self._loaded.job
         loaded = replace(self._loaded, job=job.with_stops())
         search = _Search(loaded, self._profile, self._writing, self._carried)
+        search._rough = self._rough
         try:
             first = search.first()
-            made = first if first.clean else search.slower(first)
+            made = first if search._takes(first) else search.slower(first)
         except TrajcliError:
             return None
-        if not made.keeps:
+        if not made.keeps or (made.clean and not self._takes(made)):
             return None
         loaded = replace(loaded, job=job.model_copy(update={"output": made.plan.loaded.job.output}))
         flyby = FlyBy(made.duration, made.duration, made.duration, (), None)
@@ -373,7 +398,7 @@ class _Search:
                 )
                 if made.duration >= longest:
                     return None
-                if made.clean:
+                if self._takes(made):
                     return made
         return None
 
@@ -389,7 +414,7 @@ class _Search:
             if made.duration > longest:
                 return None
             if made.clean or not made.plan.verdict.passed:
-                return made if made.clean else None
+                return made if self._takes(made) else None
             tighter = tightened(made.plan, made.over, made.uses_over, adapted, stretched=stretched)
             if tighter is None:
                 return None
@@ -417,8 +442,9 @@ class _Search:
             yield f"`{' '.join(options)}`{instead} keeps all limits, with {first.duration:.6g} s as now"
         slowed = replace(self._loaded, job=job.model_copy(update={"when_over_limit": "slow"}))
         slow = _Search(slowed, self._profile, self._writing, self._carried)
-        slow._begun = self._begun.where_slowed()
+        slow._begun, slow._rough = self._begun.where_slowed(), self._rough
         slower = slow.slower(first)
+        self._refused |= slow._refused
         if slower.keeps:
             yield f"`--set when_over_limit=slow` keeps all limits, with {slower.duration:.6g} s"
 
