@@ -254,3 +254,29 @@ def test_what_is_carried_instead_is_carried_in_plans_for_consumers() -> None:
     made = plan_for(*loaded, Writing(), lambda index, _: point_mass(3.0 + index))
     masses = [move.robot.payload.mass for move in made.plan.moves if move.robot.payload is not None]
     assert masses == [3.0, 4.0]
+
+
+BRAKING = {"planner": "jerk_limited", "to": {"velocity": 0}, "brake": True}
+
+
+@pytest.mark.parametrize("rows", ["rate", "knots"])
+@pytest.mark.parametrize(
+    ("velocity", "acceleration", "used"),
+    [(3.5, 0.0, "175 % of the velocity"), (-3.5, 0.0, "175 %"), (0.0, 12.0, "150 % of the acceleration")],
+)
+def test_a_start_outside_of_the_limits_is_refused_wherever_rows_stand(
+    rows: str, velocity: float, acceleration: float, used: str
+) -> None:
+    """Of some of them no row is beside the planned curve, so that nothing of it is judged between rows."""
+    start = {"joints": [0], "velocity": [velocity], "acceleration": [acceleration]}
+    limits = {"velocity": 2, "acceleration": 8, "jerk": 99}
+    loaded = read({"limits": limits, "start": start, "moves": [BRAKING]}, rate=100, rows=rows)
+    with pytest.raises(
+        VerificationError, match=f"starts outside of its limits, and brakes: {used}"
+    ) as refused:
+        made_for(loaded, "ros-jtc")
+    (problem,) = refused.value.problems
+    assert (problem.move, problem.joint) == (0, "j1")
+    within = {**start, "velocity": [1.0], "acceleration": [0.0]}
+    allowed = read({"limits": limits, "start": within, "moves": [BRAKING]}, rate=100, rows=rows)
+    assert rows == "rate" or made_for(allowed, "ros-jtc").keeps

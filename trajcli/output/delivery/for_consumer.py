@@ -182,6 +182,10 @@ def plan_for(
     search = _Search(loaded, profile, writing, carried)
     said = (brought,) if brought else ()
     first = search.first()
+    if first.plan.verdict.passed and any(move.planned.braking for move in first.plan.moves):
+        from trajcli.output.delivery.slower_motion import refuse_braking
+
+        refuse_braking(first.plan, first.where)
     if first.keeps or not first.plan.verdict.passed:
         return replace(first, said=said)
     from trajcli.output.delivery.slower_motion import may_be_cured

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
-from trajcli.errors import TrajcliError
+from trajcli.errors import Problem, TrajcliError, VerificationError
 from trajcli.findings import Finding
 from trajcli.judge.reconstruction import piece_coefficients
 from trajcli.kinematics.robot import QUANTITIES
@@ -40,6 +40,35 @@ def may_be_cured(finding: Finding) -> bool:
     """Return whether other rows, or a slower motion, may help against a finding of its kind."""
     placed = finding.kind == "position" and finding.joint is not None  # a wrong number of joints stays wrong
     return (placed or finding.kind in {*STRETCHABLE, "deviation"}) and finding.move is not None
+
+
+def refuse_braking(plan: Plan, where: str) -> None:
+    """Raise VerificationError where a move brakes from a start outside of its limits, in which rows begin.
+
+    Args:
+        plan: A plan that verifies.
+        where: The consumer, and where the rows stand, in words.
+    """
+    for move, peaks in zip(plan.moves, plan.verdict.peaks, strict=True):
+        if move.planned.braking is None:
+            continue
+        bounds = [move.robot.limits.of_order(order) for order in (1, 2)]
+        used = [
+            np.maximum(p.low / b[:, 0], p.high / b[:, 1]) for p, b in zip(peaks[1:3], bounds, strict=True)
+        ]
+        order, joint = np.unravel_index(np.argmax(used), np.shape(used))
+        share = f"{100 * used[order][joint]:.4g} % of the {QUANTITIES[order + 1]}"
+        name = plan.trajectory.joint_names[joint]
+        problem = Problem(
+            f"{where}: the move starts outside of its limits, and brakes: {share} of {{joint}} used",
+            hint="no rows of that keep them: let it start within them, or plan it without a consumer",
+            place=plan.loaded.place_of_move(move.index),
+            move=move.index,
+            joint=name,
+            amounts={"joint": name},
+            kind=QUANTITIES[order + 1],
+        )
+        raise VerificationError(problem)
 
 
 def _curable(finding: Finding) -> bool:
