@@ -16,6 +16,7 @@ from trajcli.columns import (
     kinds_of,
     parse_column,
     require_finite,
+    row_fields,
     whole_number_columns,
 )
 from trajcli.errors import InputError, TrajcliError
@@ -154,3 +155,24 @@ def test_the_first_row_that_is_not_finite_is_told(value):
     rows[2, 3] = rows[3, 1] = value
     with pytest.raises(TrajcliError, match=f"q3 is {value} in row 102"):
         require_finite(rows, columns, 100)
+
+
+def test_rows_have_a_field_for_each_group_and_for_each_signal() -> None:
+    names = ["t", "q1", "q2", "qd1", "x", "y", "z", "signal.a", "signal.b", "move"]
+    found = [
+        (f.name, f.first, f.stop, f.alone, f.whole_numbers) for f in row_fields([*map(parse_column, names)])
+    ]
+    assert found == [
+        ("t", 0, 1, True, False),
+        ("q", 1, 3, False, False),
+        ("qd", 3, 4, False, False),
+        ("pose", 4, 7, False, False),
+        ("signal.a", 7, 8, True, False),
+        ("signal.b", 8, 9, True, False),
+        ("move", 9, 10, True, True),
+    ]
+
+
+def test_columns_of_a_group_that_stand_apart_are_no_field() -> None:
+    with pytest.raises(TrajcliError, match="the columns q stand apart"):
+        row_fields([parse_column(name) for name in ("q1", "t", "q2")])

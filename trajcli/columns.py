@@ -15,7 +15,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, TrajcliError
-from trajcli.frozen import comparable
+from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import JointType
 from trajcli.units import (
     Dimension,
@@ -140,6 +140,45 @@ def group_of(column: Column) -> str:
     if column.kind.startswith(_SIGNAL):
         return SIGNALS
     return next((group for group, kinds in _COLUMNS.items() if column.kind in kinds), column.kind)
+
+
+@frozen
+class RowField:
+    """A group of the columns of rows, or a signal: the columns from `first` to before `stop`.
+
+    Attributes:
+        name: Of the group, or of the column of a signal.
+        first: Index of its first column.
+        stop: One behind the index of the last.
+        alone: Whether it is a single number, about no joint.
+        whole_numbers: Whether that counts.
+    """
+
+    name: str
+    first: int
+    stop: int
+    alone: bool
+    whole_numbers: bool
+
+
+def row_fields(columns: Sequence[Column]) -> tuple[RowField, ...]:
+    """Return the groups of columns in their order.
+
+    Raises:
+        TrajcliError: When the columns of a group stand apart.
+    """
+    fields: dict[str, RowField] = {}
+    last = ""
+    for index, column in enumerate(columns):
+        group = group_of(column)
+        name = column.kind if group == SIGNALS else group
+        if name in fields and name != last:
+            raise TrajcliError(f"the columns {name} stand apart")
+        first = fields[name].first if name in fields else index
+        alone = name == column.kind and column.joint is None and first == index
+        fields[name] = RowField(name, first, index + 1, alone, alone and column.whole_numbers)
+        last = name
+    return tuple(fields.values())
 
 
 def kinds_of(group: str) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from trajcli.columns import SIGNALS, Column, group_of, require_finite
+from trajcli.columns import Column, require_finite, row_fields
 from trajcli.curves.piecewise import Array
 from trajcli.errors import TrajcliError
 
@@ -122,16 +122,8 @@ def _arrays(blocks: Sequence[Array], columns: Sequence[Column]) -> dict[str, Arr
 
 def _dtype(columns: Sequence[Column]) -> np.dtype[Any]:
     """Return the type of a row: a field for each group of columns, and for each signal, which has a name."""
-    counts: dict[str, int] = {}
-    last = ""
-    for column in columns:
-        group = column.kind if group_of(column) == SIGNALS else group_of(column)
-        if group in counts and last != group:
-            raise TrajcliError(f"the columns {group} stand apart")
-        counts[group], last = counts.get(group, 0) + 1, group
-    alone = {column.kind for column in columns if column.joint is None}
-    fields: list[Any] = [(g, "<f8") if g in alone else (g, "<f8", (count,)) for g, count in counts.items()]
-    return np.dtype(fields)
+    fields = row_fields(columns)
+    return np.dtype([(f.name, "<f8", () if f.alone else (f.stop - f.first,)) for f in fields])
 
 
 def _header(dtype: np.dtype[Any], rows: int) -> bytes:

@@ -14,10 +14,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.columns import JOINT_ORDERS, SIGNALS, Column, group_of, kinds_of, require_finite
+from trajcli.columns import JOINT_ORDERS, Column, RowField, kinds_of, require_finite, row_fields
 from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem, TrajcliError
-from trajcli.frozen import frozen
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.number_cells import scan_decimals
 from trajcli.streams.recorded.column_names import read_name
@@ -30,20 +29,10 @@ _LARGEST_NUMBER = 1e300
 _SHOWN = 200  # characters of a line in a message
 
 
-@frozen
-class _Key:
-    """A key of each object: the columns [first, stop) of its rows; a single number where it stands alone."""
-
-    name: str
-    first: int
-    stop: int
-    alone: bool
-    whole_numbers: bool
-
-    def of(self, row: list[float]) -> Any:  # noqa: ANN401
-        if not self.alone:
-            return row[self.first : self.stop]
-        return int(row[self.first]) if self.whole_numbers else row[self.first]
+def _value(field: RowField, row: list[float]) -> Any:  # noqa: ANN401
+    if not field.alone:
+        return row[field.first : field.stop]
+    return int(row[field.first]) if field.whole_numbers else row[field.first]
 
 
 def write_jsonl_blocks(rows: Iterable[Array], columns: Sequence[Column], out: BinaryIO) -> Iterator[Array]:
@@ -59,11 +48,11 @@ def write_jsonl_blocks(rows: Iterable[Array], columns: Sequence[Column], out: Bi
     """
     from pydantic_core import to_json
 
-    keys = _keys(columns)
+    keys = row_fields(columns)
     written = 0
     for block in rows:
         require_finite(block, columns, written)
-        lines = (to_json({key.name: key.of(row) for key in keys}) for row in block.tolist())
+        lines = (to_json({key.name: _value(key, row) for key in keys}) for row in block.tolist())
         out.write(b"".join(line + b"\n" for line in lines))
         written += len(block)
         yield block
@@ -81,7 +70,7 @@ def verify_jsonl(written: BinaryIO, rows: Iterable[Array], columns: Sequence[Col
         TrajcliError: When a key, a number or the count of rows differs.
     """
     written.seek(0)
-    keys, count = _keys(columns), 0
+    keys, count = row_fields(columns), 0
     for block in rows:
         for row in block:
             line = written.readline()
@@ -94,7 +83,7 @@ def verify_jsonl(written: BinaryIO, rows: Iterable[Array], columns: Sequence[Col
         raise TrajcliError(f"the file read back goes on after the {count} rows that were written")
 
 
-def _numbers(line: bytes, keys: Sequence[_Key], row: int) -> list[float]:
+def _numbers(line: bytes, keys: Sequence[RowField], row: int) -> list[float]:
     """Return the numbers of a line, in the order of the columns."""
     from pydantic_core import from_json
 
@@ -105,20 +94,6 @@ def _numbers(line: bytes, keys: Sequence[_Key], row: int) -> list[float]:
         return [number for key in keys for number in ([value[key.name]] if key.alone else value[key.name])]
     except (ValueError, TypeError) as error:
         raise TrajcliError(f"row {row} of the file read back is no object of numbers: {error}") from error
-
-
-def _keys(columns: Sequence[Column]) -> tuple[_Key, ...]:
-    keys: list[_Key] = []
-    for index, column in enumerate(columns):
-        group = column.kind if group_of(column) == SIGNALS else group_of(column)
-        if keys and keys[-1].name == group:
-            keys[-1] = _Key(group, keys[-1].first, index + 1, alone=False, whole_numbers=False)
-        elif any(key.name == group for key in keys):
-            raise TrajcliError(f"the columns {group} stand apart")
-        else:
-            alone = group == column.kind and column.joint is None
-            keys.append(_Key(group, index, index + 1, alone, column.whole_numbers))
-    return tuple(keys)
 
 
 class JsonRows:
