@@ -17,7 +17,7 @@ from typing import ClassVar
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side, derivative_coefficients, horner
-from trajcli.curves.time_optimal.constraints import ConstraintRows
+from trajcli.curves.time_optimal.constraints import ConstraintRows, PathConstraint
 from trajcli.curves.time_optimal.time_law import LawPieces
 from trajcli.dynamics.newton_euler import InverseDynamics, direction
 from trajcli.frozen import frozen
@@ -75,7 +75,7 @@ class _PathDynamics:
 
 
 @frozen
-class EffortConstraint:
+class EffortConstraint(PathConstraint):
     """Limits of torques and forces of joints; between grid points they are sampled.
 
     Attributes:
@@ -135,10 +135,6 @@ class EffortConstraint:
         """Return no bound at points (p,): sdd may be anything."""
         del side
         return np.full(s.size, np.inf)
-
-    def shortest(self, s: Array) -> Array:
-        """Return 0 for each interval between points (p,), (p - 1,): a torque alone bounds no time."""
-        return np.zeros(s.size - 1)
 
     def excess(self, law: LawPieces) -> Array:
         """Return zeros for velocity, and the shares used of what gravity leaves, at samples, (2, N)."""

@@ -77,11 +77,11 @@ class PathConstraint(Protocol):
 
     def largest(self, s: Array, side: Side) -> Array:
         """Return what sd^2 cannot pass at points (p,) of the path, whatever the motion; or infinity."""
-        ...
+        return self.rows(s, side).cap
 
     def shortest(self, s: Array) -> Array:
         """Return times, s, below which no motion goes from one of points (p,) to the next one, (p - 1,)."""
-        ...
+        return np.zeros(s.size - 1)  # what joints need is known elsewhere
 
     def excess(self, law: LawPieces) -> Array:
         """Return the largest multiples of its limits that each piece of a law reaches, shape (2, N).
@@ -98,7 +98,7 @@ class PathConstraint(Protocol):
 
 
 @frozen
-class JointConstraint:
+class JointConstraint(PathConstraint):
     """Limits of the velocity and the acceleration of joints; an excess above one is a bound for all t.
 
     Attributes:
@@ -141,14 +141,6 @@ class JointConstraint:
         with np.errstate(divide="ignore", over="ignore"):
             return ConstraintRows(a, b, np.broadcast_to(limits, a.shape), rate**-2.0, work * limits)
 
-    def largest(self, s: Array, side: Side) -> Array:
-        """Return the caps at points (p,)."""
-        return self.rows(s, side).cap
-
-    def shortest(self, s: Array) -> Array:
-        """Return 0 for each interval between points (p,), (p - 1,): what joints need is known elsewhere."""
-        return np.zeros(s.size - 1)
-
     def excess(self, law: LawPieces) -> Array:
         """Return bounds of what is used of velocity and acceleration in each piece, shape (2, N)."""
         excess = np.empty((2, law.durations.size))
@@ -173,7 +165,7 @@ class JointConstraint:
 
 
 @frozen
-class ApproachConstraint:
+class ApproachConstraint(PathConstraint):
     """Limits of the velocities with which joints approach the ends of their ranges; the excess is exact.
 
     Attributes:
@@ -195,14 +187,6 @@ class ApproachConstraint:
         with np.errstate(divide="ignore", over="ignore"):
             rate = np.maximum(first / high, first / low).max(axis=1)
             return ConstraintRows(nothing, nothing, nothing, rate**-2.0)
-
-    def largest(self, s: Array, side: Side) -> Array:
-        """Return the caps at points (p,)."""
-        return self.rows(s, side).cap
-
-    def shortest(self, s: Array) -> Array:
-        """Return 0 for each interval between points (p,), (p - 1,): what joints need is known elsewhere."""
-        return np.zeros(s.size - 1)
 
     def excess(self, law: LawPieces) -> Array:
         """Return what is used of the limits in each piece, and zeros for acceleration, (2, N)."""
