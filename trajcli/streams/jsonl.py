@@ -21,7 +21,7 @@ from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.number_cells import scan_decimals
 from trajcli.streams.recorded.column_names import read_name
 from trajcli.streams.recorded.column_roles import NamedFile
-from trajcli.streams.row_sources import EXACT, FULL_DECIMALS
+from trajcli.streams.row_sources import EXACT, FULL_DECIMALS, RowSource
 
 _BLOCK = 4096  # rows gathered at a time
 _LONGEST = 1 << 24  # bytes of a line
@@ -96,12 +96,10 @@ def _numbers(line: bytes, keys: Sequence[RowField], row: int) -> list[float]:
         raise TrajcliError(f"row {row} of the file read back is no object of numbers: {error}") from error
 
 
-class JsonRows:
+class JsonRows(RowSource):
     """Rows of JSON lines, which are read anew whenever they are asked for."""
 
     format = "jsonl"
-    joint_names: tuple[str, ...] | None = None
-    si = False
 
     def __init__(self, source: ByteSource) -> None:
         """Read the keys of the first object.
@@ -124,7 +122,7 @@ class JsonRows:
                 self._columns[key] = _length(content)
         self._width = len(names)
         unread = [key for key in value if key not in self._columns]
-        self.notes: tuple[str, ...] = (f"keys that are not read: {', '.join(unread)}",) if unread else ()
+        self.notes = (f"keys that are not read: {', '.join(unread)}",) if unread else ()
         place = Place(file, first, 1, line[:_SHOWN].decode("utf-8", "replace").rstrip())
         self.named = NamedFile(file, tuple(names), lambda name: place)
         self.relative = np.zeros(self._width)

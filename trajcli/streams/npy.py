@@ -15,7 +15,7 @@ from trajcli.errors import InputError
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.recorded.column_names import MOVE, TIME, read_name
 from trajcli.streams.recorded.column_roles import NamedFile
-from trajcli.streams.row_sources import EXACT, ArrayRows, unplaced
+from trajcli.streams.row_sources import EXACT, ArrayRows, RowSource, unplaced
 
 _ROWS = 1 << 14  # rows at a time
 _LARGEST_ROW = 1 << 14  # bytes
@@ -28,11 +28,8 @@ _LARGEST_ARCHIVE = 1 << 31  # bytes of its arrays, which are held in memory
 _ORDERS = ("q", "qd", "qdd")
 
 
-class ArrayFile:
+class ArrayFile(RowSource):
     """Rows of an array in a file, which are read when they are asked for."""
-
-    joint_names: tuple[str, ...] | None = None
-    si = False
 
     def __init__(self, source: ByteSource, joints: int | None = None, *, timed: bool = True) -> None:
         """Read the shape of the array.
@@ -62,7 +59,7 @@ class ArrayFile:
             self.relative = np.full(len(names), share_of(self._dtype))
         else:
             names, self.relative, notes = self._field_names()
-        self.notes: tuple[str, ...] = tuple(notes)
+        self.notes = tuple(notes)
         self._rows = prod(self._shape[:-1] if self._plain else self._shape)
         self.named = NamedFile(source.file, tuple(names), unplaced)
 

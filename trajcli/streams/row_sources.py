@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +71,7 @@ def decimals_of_still(
     return found
 
 
-class RowSource(Protocol):
+class RowSource(ABC):
     """Rows of a file whose columns have names.
 
     Attributes:
@@ -83,38 +83,29 @@ class RowSource(Protocol):
         notes: Sentences about what was taken and what was left out.
     """
 
-    @property
-    def format(self) -> str: ...  # noqa: D102
-    @property
-    def named(self) -> NamedFile: ...  # noqa: D102
-    @property
-    def joint_names(self) -> tuple[str, ...] | None: ...  # noqa: D102
-    @property
-    def si(self) -> bool: ...  # noqa: D102
-    @property
-    def relative(self) -> Array: ...  # noqa: D102
-    @property
-    def notes(self) -> tuple[str, ...]: ...  # noqa: D102
+    format: str
+    named: NamedFile
+    joint_names: tuple[str, ...] | None = None
+    si: bool = False
+    relative: Array
+    notes: tuple[str, ...] = ()
 
+    @abstractmethod
     def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
         """Yield the rows of some columns, rising indices, block by block, (N, columns); as often as asked.
 
         The columns `fixed` hold texts that must be the same in all rows.
         """
-        ...
 
+    @abstractmethod
     def decimals(self, taken: Sequence[int]) -> NDArray[np.int64]:
         """Return the decimals of some columns, shape (columns,), once all their rows were taken."""
-        ...
 
 
-class TextRows:
+class TextRows(RowSource):
     """Rows of a table in text, which are read anew whenever they are asked for."""
 
     format = "csv"
-    joint_names: tuple[str, ...] | None = None
-    si = False
-    notes: tuple[str, ...] = ()
 
     def __init__(self, source: ByteSource) -> None:
         """Read the names, and the texts of the first row.
@@ -149,7 +140,7 @@ class TextRows:
 
 
 @frozen
-class ArrayRows:
+class ArrayRows(RowSource):
     """Rows that are in memory; its attributes are those of `RowSource`.
 
     Attributes:
@@ -176,7 +167,7 @@ class ArrayRows:
         return self.written[list(taken)]
 
 
-class TimedRows:
+class TimedRows(RowSource):
     """Rows of a file without time, at a rate: a column `t` stands in front of the others."""
 
     def __init__(self, rows: RowSource, rate: float) -> None:
@@ -247,12 +238,11 @@ def in_columns(file: str, times: Array, states: Sequence[Array]) -> tuple[NamedF
 _NANOSECONDS = 9  # decimals of a stamp in whole nanoseconds
 
 
-class LoggedRows:
+class LoggedRows(RowSource):
     """Rows of a topic, which are read anew whenever they are asked for."""
 
     format = "mcap"
     si = True
-    notes: tuple[str, ...] = ()
 
     def __init__(self, source: ByteSource, topic: str | None, field: str | None) -> None:
         """Read the first messages.
@@ -264,7 +254,7 @@ class LoggedRows:
         self._source, self._topic, self._field = source, topic, field
         with source.open() as stream:
             first = next(log_blocks(stream, source.file, topic, field))
-        self.joint_names: tuple[str, ...] | None = first.joint_names
+        self.joint_names = first.joint_names
         found = _no_number(first, 0)
         if found is not None:
             self.notes = (f"efforts are left out: {found}",)
