@@ -95,7 +95,7 @@ class FixedOrientation(Smooth):
         return np.zeros(rising.shape)
 
 
-class OverSegments(ABC):
+class OverSegments(Smooth, ABC):
     """What orientations that go from border to border of segments share.
 
     Attributes:
@@ -120,11 +120,6 @@ class OverSegments(ABC):
         sharp = self.progress.borders[1:-1][self.progress.half_widths == 0.0]
         left, right = self.evaluate(sharp, "left")[1], self.evaluate(sharp, "right")[1]
         return np.asarray(sharp[_differ(left, right)])
-
-    @property
-    def jumps(self) -> Array:
-        """None."""
-        return np.empty(0)
 
     @property
     @abstractmethod
