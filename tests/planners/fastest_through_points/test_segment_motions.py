@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from trajcli.curves.piecewise import PiecewisePolynomial
-from trajcli.planners.fastest_through_points.segment_motion import PointMotion, joined, off_chords
+from trajcli.errors import PlanningError
+from trajcli.planners.fastest_through_points.problem import WaypointProblem
+from trajcli.planners.fastest_through_points.segment_motion import (
+    PointMotion,
+    _bounds,
+    exact_motion,
+    joined,
+    off_chords,
+)
 from trajcli.planners.planner import Phase
 
 
@@ -73,3 +81,79 @@ def test_how_far_from_the_chords_it_goes_is_what_dense_times_say(later, sign):
         values = np.abs(table[:, 1 + joint])
         assert off[joint] == pytest.approx(values.max(), rel=1e-5)
         assert when[joint] == pytest.approx(table[values.argmax(), 0], abs=2e-3)
+
+
+def test_motions_of_several_segments_follow_each_other_too() -> None:
+    parts = [part([0, 0], [1, 2], 2.0), part([1, 2], [3, 1], 0.5, 1), part([3, 1], [3, 0], 1.0, 0)]
+    held = PointMotion(parts[2].curve, parts[2].times, (Phase("dwell", 0.0, 1.0, 0, 4),))
+    motion = joined([joined(parts[:2]), held])
+    assert motion.times == pytest.approx([0.0, 2.0, 2.5, 3.5])
+    assert motion.phases[-1] == Phase("dwell", 2.5, 3.5, 0, 4)
+    twice = joined([joined(parts[:2]), joined([held])])
+    assert twice.phases == motion.phases
+    assert joined([joined(parts), part([3, 0], [0, 0], 1.0)]).times == pytest.approx([0, 2, 2.5, 3.5, 4.5])
+
+
+def two_joints(**changes) -> WaypointProblem:
+    points = np.array([[0.0, 0.0], [1.0, -0.5], [1.5, 2.0]])
+    fields = {
+        "points": points,
+        "velocity": np.array([[-1.0, 2.0], [-1.5, 1.0]]),
+        "acceleration": np.array([[-1.0, 5.0], [-4.0, 4.0]]),
+        "jerk": np.array([20.0, 10.0]),
+        "states": np.zeros((3, 2, 2)),
+        "fixed": np.ones((3, 2, 2), dtype=bool),
+        "least": np.zeros(2),
+        "position": np.tile([-np.inf, np.inf], (2, 1)),
+    }
+    return WaypointProblem(**{**fields, **changes})
+
+
+def test_segments_last_as_long_as_they_are_to_and_keep_the_limits_of_each_joint() -> None:
+    """Also those of the jerk where bounds may count with a looser one."""
+    problem = two_joints(least=np.array([0.0, 6.0]), looser=np.array([3.0, 3.0]))
+    motion = exact_motion(problem, problem.states, ("a", "b"), total=1e12)
+    assert motion.times[2] - motion.times[1] == pytest.approx(6.0, rel=1e-12)
+    assert motion.times[1] < 3.0
+    np.testing.assert_allclose(motion.curve.evaluate(motion.times), problem.points, atol=1e-12)
+    times = np.linspace(0.0, motion.duration, 4001)
+    for order, bounds in ((1, problem.velocity), (2, problem.acceleration * (1 - 1e-7))):
+        rows = motion.curve.evaluate(times, order)
+        assert (rows <= bounds[:, 1] * (1 + 1e-11)).all()
+        assert (rows >= bounds[:, 0] * (1 + 1e-11)).all()
+    assert (np.abs(motion.curve.evaluate(times, 3)) <= problem.jerk * (1 + 1e-12)).all()
+
+
+def test_phases_are_those_of_each_joint_in_order_of_time() -> None:
+    problem = two_joints()
+    motion = exact_motion(problem, problem.states, ("a", "b"))
+    keys = [(phase.start, phase.joint) for phase in motion.phases]
+    assert keys == sorted(keys)
+    for joint in (0, 1):
+        own = [phase for phase in motion.phases if phase.joint == joint]
+        assert own[0].start == 0.0
+        assert own[-1].end == pytest.approx(motion.duration, rel=1e-12)
+        assert [phase.start for phase in own[1:]] == pytest.approx([phase.end for phase in own[:-1]])
+
+
+def test_a_segment_without_a_motion_names_its_joint() -> None:
+    states = np.zeros((3, 2, 2))
+    states[1, 1, 0] = 3.0
+    with pytest.raises(PlanningError) as refused:
+        exact_motion(two_joints(), states, ("first", "second"))
+    assert "second" in str(refused.value)
+    assert "first" not in str(refused.value)
+
+
+@pytest.mark.parametrize("total", [0.0, 10.0, 1e4, 1e12])
+def test_accelerations_leave_room_for_the_rounding_of_late_breaks(total: float) -> None:
+    """Four roundings of a break at the largest jerk, but never more than a ten millionth."""
+    problem = two_joints()
+    found = _bounds(problem, total)
+    np.testing.assert_array_equal(found[:, 0], problem.velocity)
+    np.testing.assert_array_equal(found[:, 2], [[-20.0, 20.0], [-10.0, 10.0]])
+    room = np.abs(problem.acceleration) - np.abs(found[:, 1])
+    lost = 4 * np.spacing(total) * problem.jerk
+    most = 1e-7 * np.abs(problem.acceleration)
+    assert (room >= np.minimum(lost[:, None], most) * (1 - 1e-6) - 1e-15).all()
+    assert (room <= most * (1 + 1e-6)).all()

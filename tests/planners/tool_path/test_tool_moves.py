@@ -189,6 +189,16 @@ def test_a_screw_has_a_constant_twist():
     np.testing.assert_allclose(away, away[0], atol=3e-6)
 
 
+@pytest.mark.parametrize("planner", ["line", "screw"])
+@pytest.mark.parametrize("turn", [pytest.param(5e-4, marks=pytest.mark.full), 1e-7])
+def test_the_tool_turns_in_its_place_however_little(planner, turn):
+    to = {**START, "rpy": [np.pi, 0, turn]}
+    made = plan("ur5e", START, {"planner": planner, "to": to, **FINE})
+    reached = poses_of(made, times_of(made, 2))
+    vector = Rotation.from_matrix(reached[1, :3, :3] @ reached[0, :3, :3].T).as_rotvec()
+    np.testing.assert_allclose(vector, [0, 0, turn], rtol=0, atol=1e-12)
+
+
 FEW = {
     "scorbot, place": ("scorbot", [0.1, -0.5, 0.8, -0.2, 0.3], {}, [0.02, 0.03, -0.02]),
     "scorbot, pitch": ("scorbot", [0.1, 0.4, -1.3, 1.2, 0.3], {"pitch": -0.9}, [0.02, 0.03, -0.02]),

@@ -82,6 +82,7 @@ QUARTER = {"center": [0.4, 0.15, 0.05], "axis": "z", "to": {"xyz": [0.45, 0.15, 
 TWO = [{"line": {"xyz": [0.4, 0.3, 0.05]}}, {"line": {"xyz": [0.5, 0.3, 0.05]}}]
 WRONG = {
     "moving end": (line({**TO, "velocity": 0.1}), "line ends at rest", 2),
+    "moving end of a screw": ({"planner": "screw", "to": {**TO, "velocity": 0.1}}, "screw ends at rest", 2),
     "no place": (line({"velocity": 0}), "needs a pose or `joints`", 2),
     "duration of the fastest": (
         line(law={"shape": "time_optimal", "duration": 2}),
@@ -265,3 +266,8 @@ def test_a_tangent_ends_where_the_path_turns_it_to():
     ends.append(plan("ur5e", START, straight).moves[0].planned.end.position)
     turned = forward(arm("ur5e"), np.array(ends))[:, :3, 0]  # the x axis of the tool
     np.testing.assert_allclose(turned @ turned[2], [0.0, 0.0, 1.0], atol=1e-5)  # by 90 and by -270 degrees
+
+
+def test_a_screw_says_with_what_a_whole_orientation_is_given():
+    error = refusal("ur5e", START, {"planner": "screw", "to": {"xyz": [0.4, 0.2, 0.1], "direction": "z"}})
+    assert error.problems[0].hint == "give `rpy`, `quat_wxyz`, `matrix`, `axis_angle` or `euler`"

@@ -154,6 +154,13 @@ def test_a_frequency_is_the_speed_of_the_law_over_a_length():
     assert np.array_equal(other.trajectory.curve.evaluate(times), same.trajectory.curve.evaluate(times))
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_side_that_is_asked_for_is_the_first(sign):
+    poses = move_of(0.1, side=[0.0, 0.0, sign], amplitude=A, length=CYCLE)[1].path.poses
+    quarter = poses.position.evaluate(np.array([CYCLE / 4]))[0][0]
+    np.testing.assert_allclose(quarter, [0.4, -0.1 + CYCLE / 4, 0.3 + sign * A], atol=1e-9)
+
+
 @pytest.mark.full
 def test_a_side_says_where_it_swings_first():
     s, places = on_rows(weaving(weave={"side": [0.0, 0.0, 1.0]}))
@@ -296,6 +303,14 @@ def test_weaves_that_are_none(move, weave, message):
     assert message in problems[0].message
 
 
+def test_a_frequency_without_a_speed_is_marked_at_its_place():
+    given = {"amplitude": A, "frequency": 2.0}
+    move = {"planner": "line", "to": {"xyz": TO}, "law": {"shape": "time_optimal"}, "weave": given}
+    (problem,) = refusal("ur5e", HERE, move, limits=WIDE).problems
+    text = job_text("ur5e", HERE, move, limits=WIDE)
+    assert text[problem.place.column - 1 :].startswith(("2.0", '"frequency"'))
+
+
 @pytest.mark.full
 def test_a_weave_is_not_flown_by():
     """A zone of its own is an error; the job's is not used there."""
@@ -333,7 +348,10 @@ def test_more_cycles_than_fit_into_memory_are_refused_with_the_shortest_length()
     """0.2 m of 100000 cycles are 2 um each; 2e8 of them took 6 GiB for their breaks alone."""
     move = {"planner": "line", "to": {"xyz": TO}, "law": LAW}
     for weave in ({"length": 1e-9}, {"frequency": 2e10}):
-        text = str(refusal("ur5e", HERE, {**move, "weave": {"amplitude": A, **weave}}, limits=WIDE))
+        error = refusal("ur5e", HERE, {**move, "weave": {"amplitude": A, **weave}}, limits=WIDE)
+        text = str(error)
+        place = job_text("ur5e", HERE, {**move, "weave": {"amplitude": A, **weave}}, limits=WIDE)
+        assert place[error.problems[0].place.column - 1 :].startswith('{"amplitude"')
         assert "at most 100000 cycles weave" in text
         assert "2e-06 m or longer, not 1e-" in text
 
