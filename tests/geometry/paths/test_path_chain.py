@@ -178,8 +178,37 @@ def test_a_path_that_turns_back_is_named_and_may_be_stopped_at():
     assert chain.stops.size == 1
     with pytest.raises(
         PlanningError, match=r"at s = 1.96\d* m the path turns back by 180 deg: about which axis"
-    ):
+    ) as refused:
         chain.transport(np.zeros(1))
+    assert refused.value.problems[0].hint == "orientation: axis_angle or fixed; or a path without a reversal"
+
+
+def test_what_two_corners_leave_of_a_segment_is_part_of_the_path_however_short_it_is():
+    """A ten thousandth of the second line: without it the path would jump."""
+    chain = join(SQUARE, [0.49995, 0.49995])
+    assert len(chain.parts) == 5
+    left, right = (chain.evaluate(chain.breaks, side)[0] for side in ("left", "right"))
+    np.testing.assert_allclose(left, right, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [4, 40])
+def test_of_two_neighbours_that_one_is_asked_whose_side_it_is(count):
+    """Also within a part that is made of parts; of few and of many."""
+    inner = join(STADIUM[:3])
+    zigzag = [[0.5, 1, 0], *([0.5, 2.0 + k, 1.0 + k % 2] for k in range(2 * count))]
+    chain = join([inner, *polyline(*zigzag)])
+    assert (chain._together is None) == (count == 4)
+    for side in ("left", "right"):
+        for own, whole in zip(
+            inner.evaluate(inner.breaks, side), chain.evaluate(inner.breaks, side), strict=True
+        ):
+            np.testing.assert_allclose(whole, own, rtol=0, atol=1e-12)
+        turned = zip(inner.transport(inner.breaks, side), chain.transport(inner.breaks, side), strict=True)
+        for own, whole in turned:
+            np.testing.assert_allclose(whole, own, rtol=0, atol=1e-12)
+    for outside in (-0.01, chain.length + 0.01):
+        with pytest.raises(ValueError, match="s"):
+            chain.evaluate(np.array([0.0, outside]))
 
 
 def test_the_tools_attitude_jumps_by_the_angle_of_a_sharp_corner():

@@ -67,7 +67,7 @@ def test_what_is_given_at_a_point_is_kept_and_the_other_fits_it(given: int) -> N
     fixed[1:-1, :, given] = True
     states[1:-1, :, given] = np.array([[1.9, 0.4], [-0.9, -1.4], [0.5, 0.1], [1.2, 0.3]])
     if given:
-        states[1, :, 1] = 8.0, -4.0  # at the limits
+        states[1, :, 1] = -3.0, 2.0  # at the limits
     problem = problem_of(np.arange(12.0).reshape(6, 2), fixed, states)
     asked = np.full((6, 2, 2), 30.0)
     found = problem.inside(asked)
