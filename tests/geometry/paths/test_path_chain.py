@@ -277,3 +277,14 @@ def test_one_segment_is_a_chain():
     assert chain.evaluate(np.empty(0))[0].shape == (0, 3)
     with pytest.raises(ValueError, match="leaves"):
         chain.evaluate(np.array([1.1]))
+
+
+def test_a_gap_is_said_with_both_segments_and_what_is_allowed():
+    """Behind segments that fit."""
+    segments = [*polyline([0, 0, 0], [1, 0, 0], [1, 1, 0]), Line([1, 1.5, 0], [0, 1, 0])]
+    with pytest.raises(InputError) as refused:
+        join(segments)
+    assert str(refused.value) == (
+        "segment 3 of the path starts at [1, 1.5, 0] m, 0.5 m from [1, 1, 0] m, "
+        "where segment 2 ends (allowed is 1e-09 m)"
+    )
