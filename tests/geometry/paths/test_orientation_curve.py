@@ -232,3 +232,17 @@ def test_what_does_not_fit_is_refused():
     ):
         with pytest.raises(InputError, match="mirrors space"):
             make()
+
+
+@pytest.mark.parametrize(
+    ("axis", "wanted"),
+    [
+        ([1e-6, -1.0, 0.0], [1e-6, -1.0, 0.0]),
+        ([-1e-6, 1.0, 0.0], [1e-6, -1.0, 0.0]),
+        ([-1e-11, 1.0, 0.0], [0.0, 1.0, 0.0]),  # rounding, that says nothing by its sign
+        ([0.0, 1e-6, -1.0], [0.0, 1e-6, -1.0]),
+    ],
+)
+def test_of_half_a_turn_the_axis_has_its_first_component_positive_however_small_it_is(axis, wanted):
+    half = Rotation.from_rotvec(np.pi * np.array(axis)).as_matrix()
+    np.testing.assert_allclose(turn_vectors(np.eye(3), half), np.pi * np.array(wanted), rtol=0, atol=1e-9)

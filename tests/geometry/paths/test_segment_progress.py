@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -88,3 +90,29 @@ def test_one_segment_and_one_of_no_length():
     assert np.isfinite(SegmentProgress.even(0.0).majorant(np.zeros(1), np.zeros(1), np.ones((4, 1)))).all()
     still = SegmentProgress.even(0.0).between(TARGETS[:2], np.zeros(1))
     np.testing.assert_allclose(still[0], TARGETS[:1])
+
+
+@pytest.mark.parametrize(("first", "second"), [(1.0, 1.0), (3.0, 0.5), (0.0, 2.0)])
+def test_bounds_of_what_is_done_hold_where_one_segment_fades_into_the_next(first, second):
+    """All segments count for themselves, as their axes may point anywhere; the law is s = t."""
+    width = 0.3
+    progress = SegmentProgress(np.array([0.0, 1.0, 3.0]), np.array([width / 2]))
+    rising = np.zeros((5, 3))
+    rising[1] = 1.0
+    found = progress.majorant(np.array([first, 2.0 * second]), np.array([0.4, 1.0, 2.0]), rising)
+    x = np.linspace(0.0, 1.0, 1001)
+    ramp = 3 * x**2 - 2 * x**3, 6 * x * (1 - x) / width, (6 - 12 * x) / width**2, np.full(1001, 12) / width**3
+    fading = [first * (1 - ramp[0]) + second * ramp[0]]
+    fading += [(first + second) * np.abs(each) for each in ramp[1:]]
+    sizes = np.array([each.max() / math.factorial(m) for m, each in enumerate(fading, 1)])
+    assert (found[1:, 1] >= sizes * (1 - 1e-12)).all()
+    assert (found[1:, 1] <= 2.5 * np.maximum(sizes, 1e-12)).all()
+    np.testing.assert_allclose(found[:, 0], [0, first, 0, 0, 0], rtol=1e-12)
+    np.testing.assert_allclose(found[:, 2], [0, second, 0, 0, 0], rtol=1e-12)
+
+
+def test_what_is_outside_of_a_path_is_refused():
+    progress = SegmentProgress(np.array([0.0, 1.0, 3.0]), np.array([0.1]))
+    for s in (-0.01, 3.01):
+        with pytest.raises(ValueError, match="s"):
+            progress.at(np.array([0.5, s]))
