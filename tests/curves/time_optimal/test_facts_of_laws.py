@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from topp_paths import over, polyline, random_bounds, spline, symmetric
@@ -9,9 +12,15 @@ from topp_paths import over, polyline, random_bounds, spline, symmetric
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.time_optimal import parameterization
 from trajcli.curves.time_optimal.constraints import JointConstraint
-from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError, time_optimal
+from trajcli.curves.time_optimal.parameterization import (
+    GridSolution,
+    PathProblem,
+    UnsettledSpeedError,
+    time_optimal,
+)
 from trajcli.curves.time_optimal.passes import UnlimitedSpeedError
 
+needed = GridSolution.needed.fget
 FROM_REST = 2 * np.sqrt([0.3, 0.3, 0.4])  # over these distances, at 1 m/s^2
 
 
@@ -112,8 +121,78 @@ def test_limits_of_further_constraints_count_in_the_bound() -> None:
 
 
 def test_a_path_of_no_length_has_no_fastest_law() -> None:
-    with pytest.raises(UnlimitedSpeedError):
-        time_optimal(PiecewisePolynomial(np.zeros(2), np.zeros((2, 1, 1))), symmetric(1.0), symmetric(1.0))
+    with pytest.raises(UnlimitedSpeedError) as refused:
+        time_optimal(
+            PiecewisePolynomial(np.full(2, 3.0), np.zeros((2, 1, 1))), symmetric(1.0), symmetric(1.0)
+        )
+    assert refused.value.s == 3.0
+
+
+def test_where_nothing_bounds_the_acceleration_the_start_is_named() -> None:
+    path = PiecewisePolynomial(np.array([2.0, 3.0]), np.array([[[1.0]], [[0.0]]]))
+    with pytest.raises(UnlimitedSpeedError) as refused:
+        time_optimal(path, symmetric(1.0), np.array([[-np.inf, np.inf]]))
+    assert refused.value.s == 2.0
+
+
+def test_speeds_that_cannot_be_are_said_each_at_its_end() -> None:
+    with pytest.raises(ValueError, match=r"path velocities -1\.0 and 2\.5 must be finite, not negative"):
+        time_optimal(
+            polyline([[0.0], [1.0]]), symmetric(9.0), symmetric(1.0), start_velocity=-1.0, end_velocity=2.5
+        )
+
+
+@pytest.mark.parametrize(("velocity", "acceleration"), [(1.0, 1.44), (1.2, 1.3)])
+def test_what_is_exceeded_is_named_in_the_middle_of_its_interval_by_its_own_factor(
+    velocity: float, acceleration: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An acceleration by its own excess, though slowing down by its root would do."""
+    excess = np.array([[[1.0, velocity], [1.0, acceleration]]])
+    solution = SimpleNamespace(grid=np.array([0.0, 0.25, 1.0]), pieces=None, needed=1.2, excess=excess)
+    monkeypatch.setattr(parameterization, "_refined_solution", lambda _: (solution, 0, 0.0))
+    monkeypatch.setattr(parameterization, "_tightened_solution", lambda _: (solution, 1))
+    with pytest.raises(UnsettledSpeedError) as refused:
+        time_optimal(polyline([[0.0], [1.0]]), symmetric(9.0), symmetric(9.0), start_velocity=0.1)
+    assert (refused.value.s, refused.value.over) == (0.625, max(velocity, acceleration))
+    assert f"s = 0.625 a limit is passed by a factor of {acceleration:g}" in str(refused.value)
+
+
+def test_a_motion_that_is_stretched_stops_at_its_stops_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(GridSolution, "needed", property(lambda _: 1.5))
+    monkeypatch.setattr(parameterization, "_MOST_TIGHTENINGS", 0)
+    path = polyline([[0.0], [0.3], [0.6], [0.2]], [0.0, 0.3, 0.6, 1.0])
+    found = time_optimal(path, symmetric(9.0), symmetric(1.0), stops=[0.3])
+    assert found.stretch == 1.5
+    np.testing.assert_allclose(found.stop_times, 1.5 * np.cumsum(FROM_REST)[:2], rtol=1e-4)
+
+
+@pytest.mark.parametrize("over", [5e-9, 1e-8, 1e-3])
+def test_what_a_verdict_would_not_forgive_is_stretched_away(over: float) -> None:
+    """Limits may be passed by a billionth of them; of an acceleration the root is enough."""
+    for index, power in ((0, 1.0), (1, 0.5)):
+        excess = np.ones((2, 2, 3))
+        excess[1, index, 2] += over
+        solution: Any = SimpleNamespace(excess=excess)
+        assert needed(solution) == pytest.approx((1 + over) ** power, rel=1e-14, abs=0)
+    assert needed(SimpleNamespace(excess=np.full((1, 2, 2), 1 + 1e-12))) == 1.0  # type: ignore[arg-type]
+
+
+def test_what_a_finer_grid_would_gain_is_estimated(monkeypatch: pytest.MonkeyPatch) -> None:
+    path, *bounds = curved()
+    fine = time_optimal(path, *bounds)
+    monkeypatch.setattr(parameterization, "_ROUNDS", 0)
+    coarse = time_optimal(path, *bounds)
+    assert 0 <= fine.lost <= 1e-3
+    gained = coarse.trajectory.duration / fine.trajectory.duration - 1
+    assert gained / 5 <= coarse.lost <= 20 * gained
+
+
+def test_the_strictest_of_the_constraints_says_how_fine_a_grid_is() -> None:
+    further: Any = (SimpleNamespace(estimate=0.1), SimpleNamespace(estimate=0.7))
+    path = polyline([[0.0], [1.0]])
+    joints = JointConstraint(path, symmetric(1.0), symmetric(1.0))
+    for rows in (further, further[::-1]):
+        assert PathProblem(joints, rows, np.empty(0), (0.0, 0.0)).estimate == 0.1
 
 
 def test_a_path_that_stands_still_at_its_ends_may_be_stretched(monkeypatch: pytest.MonkeyPatch) -> None:
