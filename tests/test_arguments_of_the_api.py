@@ -281,3 +281,19 @@ def test_a_pose_that_is_off_a_rotation_means_the_nearest_one(off: float) -> None
     assert answers
     for answer in answers:
         np.testing.assert_allclose(arm.fk(answer.joints)[:3, :3], nearest, atol=0.05 * off, rtol=0)
+
+
+def test_answers_are_named_as_far_as_their_arm_has_names_and_the_nearest_to_zero_comes_first() -> None:
+    arm = trajcli.load_robot("scara")
+    answers = arm.ik(arm.fk(np.full(len(arm.joints), 0.3)))
+    assert {tuple(answer.branch.items()) for answer in answers} == {(("elbow", "up"),), (("elbow", "down"),)}
+    assert {repr(answer).split("], ")[1] for answer in answers} == {"up)", "down)"}
+    six = trajcli.load_robot("ur5e")
+    found = [np.abs(answer.joints).max() for answer in six.ik(six.fk([0.3, -1.2, 1.4, -0.7, 0.9, 0.2]))]
+    assert len(found) == 8
+    assert found == sorted(found)
+
+
+def test_lines_are_a_text_and_no_path() -> None:
+    with pytest.raises(trajcli.InputError):
+        trajcli.plan("moves:\n- hold\n")
