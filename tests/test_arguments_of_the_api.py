@@ -211,6 +211,11 @@ def test_rows_and_consumer_of_a_plan_go_before_its_job(tmp_path: Path) -> None:
     assert trajcli.plan(job, rows="knots", consumer="ros-jtc").loaded.job.output.rows == "knots"
     with pytest.raises(trajcli.VerificationError, match="ros-jtc at 7 Hz"):
         trajcli.plan(job, rows="rate", consumer="ros-jtc")
+    knots = job_file(tmp_path, STEP, output={"rows": "knots"})
+    with pytest.raises(trajcli.VerificationError, match="the rows have 1 joint, and 6 are moved"):
+        trajcli.plan(knots, consumer="ur-servoj")
+    with pytest.raises(trajcli.InputError, match="ur-servoj takes rows at 500 Hz, and `rows: knots`"):
+        trajcli.plan(knots, rows="knots", consumer="ur-servoj")
 
 
 def test_a_plan_for_a_consumer_is_saved_with_the_digits_that_it_needs(tmp_path: Path) -> None:
