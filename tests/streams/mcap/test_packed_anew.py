@@ -150,13 +150,13 @@ def test_a_number_that_is_none_is_named_by_its_message_and_joint(log: Path, tmp_
         read_mcap(packed(log, tmp_path / "b.mcap", order, 900))
 
 
-def _without_effort(message: int) -> Callable[[Messages], Messages]:
+def _without_effort(message: int, value: float = np.nan) -> Callable[[Messages], Messages]:
     """Return an order in which the last joint has no effort in one message."""
 
     def order(messages: Messages) -> Messages:
         states = of_topics(messages, STATES)
         topic, time, data = states[message]
-        states[message] = topic, time, data[:-8] + np.float64(np.nan).tobytes()
+        states[message] = topic, time, data[:-8] + np.float64(value).tobytes()
         return states + of_topics(messages, ACCELERATIONS)
 
     return order
@@ -176,11 +176,13 @@ def test_efforts_that_are_none_at_the_start_are_left_out_with_a_note(
     assert found.whole().q.tobytes() == read_mcap(log).position.tobytes()
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_later_effort_that_is_none_is_refused_unless_efforts_are_left_out(
-    log: Path, tmp_path: Path
+    value: float, log: Path, tmp_path: Path
 ) -> None:
-    path = packed(log, tmp_path / "b.mcap", _without_effort(40), 900)
-    with pytest.raises(InputError, match="the effort of wrist_3_joint in message 40 of /joint_states is nan"):
+    path = packed(log, tmp_path / "b.mcap", _without_effort(40, value), 900)
+    said = f"the effort of wrist_3_joint in message 40 of /joint_states is {value}"
+    with pytest.raises(InputError, match=said):
         open_motion(path)
     found = open_motion(path, columns="tau=none")
     assert (found.rows, found.quantities) == (61, ("q", "qd", "qdd"))
@@ -198,5 +200,6 @@ def test_only_in_a_log_of_ours_a_topic_of_accelerations_is_that(log: Path, tmp_p
 
 def test_the_other_topics_of_a_log_of_ours_are_read_alone(log: Path) -> None:
     wanted = read_mcap(log)
+    assert open_motion(log, topic=ACCELERATIONS).whole().q.tobytes() == wanted.acceleration.tobytes()
     assert read_mcap(log, ACCELERATIONS).position.tobytes() == wanted.acceleration.tobytes()
     assert read_mcap(log, "/joint_trajectory").velocity[-1].tolist() == [0.0] * 6

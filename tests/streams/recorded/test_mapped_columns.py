@@ -37,6 +37,9 @@ def taken(names: str, found: ColumnRoles, quantity: str) -> str:
         ("t,wrist_position,elbow_position", None, None, {"q": "wrist_position elbow_position"}),
         ("t,q0,q1", None, None, {"q": "q0 q1"}),
         ("t,A1,A2", "q1=A2 [deg],q2=A1", None, {"q": "A2 A1"}),
+        ("t,A1,A2", " q1 = A2 , q2= A1", None, {"q": "A2 A1"}),  # as somebody writes in quotes
+        ("t,q1,q2,qd1,qd2", "qd=None", None, {"q": "q1 q2"}),
+        ("t,q1,q2,a1,a2", "qd=a", None, {"q": "q1 q2", "qd": "a1 a2"}),  # and are no accelerations, too
     ],
 )
 def test_which_columns_are_taken(
@@ -113,3 +116,14 @@ def test_columns_that_are_not_read_are_named_up_to_twelve() -> None:
     names = [f"c{k}" for k in range(15)]
     assert note_of_unread(names[:12]) == (f"columns that are not read: {', '.join(names[:12])}",)
     assert note_of_unread(names) == (f"columns that are not read: {', '.join(names[:12])} and 3 more",)
+
+
+def test_a_file_that_names_its_joints_has_them_all_or_those_that_are_wanted() -> None:
+    """Whoever wants none has those of the file; what is left out is told."""
+    file = file_of("t,wrist_position,elbow_position,finger_position")
+    roles = assign_roles(file)
+    names = ("wrist", "elbow", "finger")
+    assert ordered_joints(file, roles, roles.joint_names, None) == ([0, 1, 2], names, ())
+    found = ordered_joints(file, roles, roles.joint_names, ["elbow", "wrist"])
+    assert found == ([1, 0], ("elbow", "wrist"), ("joints that are not of the robot: finger",))
+    assert ordered_joints(file_of("t,q1"), assign_roles(file_of("t,q1")), None, None) == ([0], None, ())
