@@ -219,3 +219,44 @@ def test_an_arm_whose_rail_is_pinned_is_singular_where_its_wrist_is_aligned() ->
         assert told.joints[0] == pytest.approx(0.5)
         assert (told.singular, told.rank) == (singular, {"here": 5 if singular else 6, "nearby": 6})
         assert (told.free_direction is not None) == singular
+
+
+FACTORS = np.array([1e3, 180 / math.pi, 180 / math.pi])
+
+
+def test_blends_are_the_motion_about_their_points_in_the_times_and_units_of_the_job() -> None:
+    """The parabolas are evaluated over all their durations, from the start of the job's times."""
+    through = [{"joints": [120, 20, -5], "time": 1}, {"joints": [100, 12, -5], "time": 2}]
+    move = {"planner": "blends", "through": through, "blend_durations": 0.3}
+    plan = plan_job(job_from_text(json.dumps({**JOB, "moves": [move]})))
+    told = explanation(plan).moves[0]
+    assert told.blends is not None
+    assert {(blend.index, blend.joint) for blend in told.blends} == {
+        (index, name) for index in range(3) for name in ("slide", "turn", "still")
+    }
+    for blend in told.blends:
+        joint = ("slide", "turn", "still").index(blend.joint)
+        assert blend.time == pytest.approx((0, 1, 2)[blend.index])
+        assert (blend.start, blend.end) == pytest.approx((blend.time - 0.15, blend.time + 0.15))
+        assert blend.unit == ("mm", "deg", "deg")[joint]
+        for t in np.linspace(blend.start + 1e-9, blend.end - 1e-9, 7):
+            q = FACTORS[joint] * plan.trajectory(t + 0.15)[joint]
+            assert np.polyval(blend.coefficients[::-1], t - blend.time) == pytest.approx(q, abs=1e-6)
+
+
+def test_knots_state_the_motion_in_the_units_of_each_joint() -> None:
+    """A joint that stands has no velocity, not what rounding leaves of one."""
+    plan = planned()
+    told = explanation(plan, move=2).moves[0]
+    assert told.knots is not None
+    assert sum(knot.virtual for knot in told.knots) == 2
+    span = plan.trajectory.spans[2]
+    for knot in told.knots:
+        states = plan.trajectory.curve.evaluate_orders(np.array([span.start + knot.time]), (0, 1, 2))[0]
+        for order, stated in enumerate((knot.position, knot.velocity, knot.acceleration)):
+            inner = 0 < knot.time < span.duration or order < 2
+            assert not inner or stated == pytest.approx((states[order] * FACTORS).tolist(), abs=1e-6)
+        assert (knot.velocity[2], knot.acceleration[2]) == (0.0, 0.0)
+        assert list(knot.units) == ["mm", "deg", "deg"]
+        assert list(knot.velocity_units) == ["mm/s", "deg/s", "deg/s"]
+        assert list(knot.acceleration_units) == ["mm/s^2", "deg/s^2", "deg/s^2"]

@@ -127,3 +127,15 @@ def test_rounding_is_measured_by_the_piece_that_it_is_in():
     small, large = polynomial_intervals(np.array([0.0, 1.0, 2.0]), rows, "deg")
     assert small.local == [0, 3e-13, 0]
     assert large.local == [1, 0, 0]
+
+
+def test_what_is_a_billionth_of_the_largest_term_is_none_of_rounding():
+    (found,) = polynomial_intervals(np.array([0.0, 1.0]), np.array([[1e-9], [0.0], [1.0]]), "deg")
+    assert found.local == [1.0, 0.0, 1e-9]
+
+
+def test_noise_of_a_piece_at_rest_is_measured_by_all_pieces():
+    """5e-14 beside a way of 10: nothing moves by that."""
+    rows = np.array([[5.0, 0.0], [0.0, 5e-14]])
+    found = polynomial_intervals(np.array([0.0, 2.0, 3.0]), rows, "deg")
+    assert [each.local for each in found] == [[0.0, 5.0], [0.0, 0.0]]

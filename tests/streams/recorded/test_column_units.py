@@ -11,7 +11,9 @@ from trajcli.streams.recorded.column_roles import NamedFile, assign_roles
 from trajcli.streams.recorded.column_units import (
     ColumnScales,
     SaidUnits,
+    columns_said,
     is_own_language,
+    no_unit,
     parse_units,
     scales_of,
 )
@@ -156,3 +158,29 @@ def test_efforts_may_say_their_unit() -> None:
 def test_a_file_is_of_our_language_where_every_name_is(names: str, own: bool) -> None:
     assert is_own_language(names.split(",")) is own
     assert is_own_language(names.split(",")[::-1]) is own
+
+
+def test_columns_of_our_own_that_name_no_unit_have_the_one_that_is_said() -> None:
+    """By what each measures; what names a unit keeps it, and times and moves have none."""
+    names = ["t", "q1", "q2", "qd2", "q3_mm", "x", "move"]
+    said = SaidUnits("deg", "mm")
+    found = columns_said(names, said, ("revolute", "prismatic", "prismatic"))
+    assert [column.unit for column in found] == [None, "deg", "mm", "mm", "mm", "mm", None]
+    assert [column.unit for column in columns_said(names, SaidUnits(length="m"), ("revolute",))][5] is None
+
+
+def test_lengths_alone_may_be_said_and_stamps_of_rostopic_too() -> None:
+    """Messages print nanoseconds; a user goes before that, as before the units of a language."""
+    plain = Units()
+    assert scales("t,q1", "mm", joint_types=("prismatic",), plain=plain).notes == (
+        "columns that name no unit are read in mm, as --units says",
+    )
+    echo = "%time,field.position0,field.position1"
+    assert scales(echo, "rad").per_second == 1e9
+    assert scales(echo, "rad,ms").per_second == 1e3
+
+
+@pytest.mark.parametrize(("largest", "guess"), [(12.0, "radians?"), (13.0, "degrees?"), (120.0, "degrees?")])
+def test_two_turns_are_the_most_that_is_taken_for_radians(largest: float, guess: str) -> None:
+    error = no_unit(NamedFile("rows.csv", ("t", "q1"), lambda name: None), ["q1"], largest)
+    assert f"values up to {largest:.3g}: {guess} say it" in str(error.problems[0].hint)
