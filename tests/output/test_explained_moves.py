@@ -224,10 +224,11 @@ def test_an_arm_whose_rail_is_pinned_is_singular_where_its_wrist_is_aligned() ->
 FACTORS = np.array([1e3, 180 / math.pi, 180 / math.pi])
 
 
-def test_blends_are_the_motion_about_their_points_in_the_times_and_units_of_the_job() -> None:
+@pytest.mark.parametrize("duration", [0.3, 0.25, 0.7])
+def test_blends_are_the_motion_about_their_points_in_the_times_and_units_of_the_job(duration: float) -> None:
     """The parabolas are evaluated over all their durations, from the start of the job's times."""
     through = [{"joints": [120, 20, -5], "time": 1}, {"joints": [100, 12, -5], "time": 2}]
-    move = {"planner": "blends", "through": through, "blend_durations": 0.3}
+    move = {"planner": "blends", "through": through, "blend_durations": duration}
     plan = plan_job(job_from_text(json.dumps({**JOB, "moves": [move]})))
     told = explanation(plan).moves[0]
     assert told.blends is not None
@@ -237,10 +238,12 @@ def test_blends_are_the_motion_about_their_points_in_the_times_and_units_of_the_
     for blend in told.blends:
         joint = ("slide", "turn", "still").index(blend.joint)
         assert blend.time == pytest.approx((0, 1, 2)[blend.index])
-        assert (blend.start, blend.end) == pytest.approx((blend.time - 0.15, blend.time + 0.15))
+        assert (blend.start, blend.end) == pytest.approx(
+            (blend.time - duration / 2, blend.time + duration / 2)
+        )
         assert blend.unit == ("mm", "deg", "deg")[joint]
         for t in np.linspace(blend.start + 1e-9, blend.end - 1e-9, 7):
-            q = FACTORS[joint] * plan.trajectory(t + 0.15)[joint]
+            q = FACTORS[joint] * plan.trajectory(t + duration / 2)[joint]
             assert np.polyval(blend.coefficients[::-1], t - blend.time) == pytest.approx(q, abs=1e-6)
 
 
