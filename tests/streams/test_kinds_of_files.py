@@ -184,3 +184,11 @@ def test_numbers_of_binary_files_have_every_decimal(tmp_path: Path) -> None:
     table = read_table(tmp_path / "rows.npy")
     (value,) = {float(f"{each:.{table.decimals[1]}f}") - each for each in table.columns[:, 1]}
     assert value == 0.0
+
+
+@pytest.mark.parametrize("before", [0, 90, 3000, 60_000])
+def test_a_message_behind_words_of_any_length_is_one(before: int, tmp_path: Path) -> None:
+    words = f"# {'w' * before}\n" if before else ""
+    path = written(tmp_path, f"{words}joint_names: [a]\npoints:\n- {POINT}\n")
+    assert format_of_rows(ByteSource(path)) == "ros"
+    assert read_table(path).columns.tolist() == [[1.0, 0.5]]

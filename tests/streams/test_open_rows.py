@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -63,3 +64,22 @@ def test_what_the_taker_raises_is_left_alone(tmp_path: Path) -> None:
 
     with pytest.raises(BrokenPipeError):
         take()
+
+
+def test_rows_of_standard_input_are_named_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    with io.TextIOWrapper(io.BytesIO(b"t,q1\n0,1\n1,x\n")) as stream:
+        monkeypatch.setattr("sys.stdin", stream)
+        rows = open_rows("-")
+        assert (rows.file, rows.names) == ("stdin", ("t", "q1"))
+        with pytest.raises(InputError) as caught:
+            list(rows.blocks)
+    assert str(caught.value.problems[0].place).startswith("stdin:3:3")
+
+
+def test_tables_are_not_changed(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_text("t,q1\n0,1.25\n1,2\n")
+    found = read_csv(tmp_path / "rows.csv")
+    for array in (found.columns, found.decimals):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 7
+    assert found.column("q1").tolist() == [1.25, 2.0]

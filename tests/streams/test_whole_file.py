@@ -11,7 +11,14 @@ from pathlib import Path
 import pytest
 
 from trajcli.errors import FileError
-from trajcli.streams.whole_file import is_folder, kind_of, paths_below, standard_output, whole_file
+from trajcli.streams.whole_file import (
+    is_folder,
+    kind_of,
+    paths_below,
+    standard_output,
+    whole_file,
+    write_content,
+)
 
 AS_ROOT = os.geteuid() == 0
 
@@ -270,3 +277,19 @@ def test_standard_output_in_memory(capsysbinary):
     with standard_output() as out:
         out.write(b"bytes")
     assert capsysbinary.readouterr().out == b"bytes"
+
+
+@pytest.mark.parametrize("path", [None, "-"])
+def test_content_for_standard_output_makes_no_file(
+    path: str | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfdbinary: pytest.CaptureFixture[bytes],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_content(b"\x00rows\n", path)
+    assert capfdbinary.readouterr().out == b"\x00rows\n"
+    assert list(tmp_path.iterdir()) == []
+    write_content(b"\x00rows\n", "out.bin")
+    assert (tmp_path / "out.bin").read_bytes() == b"\x00rows\n"
+    assert capfdbinary.readouterr().out == b""
