@@ -84,8 +84,9 @@ def test_batch_plans_each_job_once(tmp_path: Path) -> None:
     assert (tmp_path / "out/one.csv").read_bytes() == direct.read_bytes()
     again = trajcli.batch([tmp_path], tmp_path / "out", processes=1)
     assert [one.outcome for one in again] == ["unchanged", "unchanged", "failed"]
-    with pytest.raises(trajcli.InputError, match="processes"):
-        trajcli.batch([tmp_path], processes=0)
+    for count in (0, 10**6):
+        with pytest.raises(trajcli.InputError, match="processes: expected 1 to"):
+            trajcli.batch([tmp_path], processes=count)
 
 
 def test_wrong_input_is_one_error(tmp_path: Path) -> None:
@@ -96,3 +97,42 @@ def test_wrong_input_is_one_error(tmp_path: Path) -> None:
     with pytest.raises(trajcli.InputError, match="pictures"):
         trajcli.plot(JOB, tmp_path / "a.xyz")
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_format_cannot_hold_is_told_where_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").write_text("t,q1,move\n0,0,0\n1,1,0\n2,0,1\n")
+    motion = trajcli.resample(tmp_path / "rows.csv", 2)
+    assert motion.save(tmp_path / "rows.jsonl") == ()
+    (note,) = motion.save(tmp_path / "rows.mcap")
+    assert "move" in note
+    assert (tmp_path / "rows.mcap").read_bytes()[1:5] == b"MCAP"
+
+
+@pytest.mark.parametrize("meshes", [float("inf"), float("nan"), -0.5, "1", None])
+def test_a_length_of_meshes_is_a_number(meshes: object, tmp_path: Path) -> None:
+    with pytest.raises(trajcli.InputError, match="meshes: expected megabytes, 0 at least, got"):
+        trajcli.view(JOB, tmp_path / "a.html", meshes=meshes)  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_message_about_other_joints_is_not_drawn_over_a_job(tmp_path: Path) -> None:
+    points = "points:\n- {positions: [0.5], time_from_start: {sec: 1}}\n"
+    for name, fits in (("j1", True), ("elbow", False)):
+        (tmp_path / "goal.yaml").write_text(f"joint_names: [{name}]\n{points}")
+        try:
+            trajcli.plot(EXAMPLES / "cubic.yaml", tmp_path / "a.svg", over=tmp_path / "goal.yaml")
+        except trajcli.InputError as error:
+            assert not fits, error
+            assert "there is no joint 'j1'" in str(error)
+        else:
+            assert fits
+            (tmp_path / "a.svg").unlink()
+    assert not (tmp_path / "a.svg").exists()
+
+
+def test_a_batch_writes_the_format_that_is_asked_for(tmp_path: Path) -> None:
+    job = EXAMPLES / "cubic.yaml"
+    (one,) = trajcli.batch(job, tmp_path, form="jsonl", processes=1)
+    trajcli.plan(job).save(tmp_path / "direct.jsonl")
+    assert Path(one.job.output) == tmp_path / "cubic.jsonl"
+    assert (tmp_path / "cubic.jsonl").read_bytes() == (tmp_path / "direct.jsonl").read_bytes()
