@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from trajcli.errors import InputError
 from trajcli.queries.pose import (
-    PoseAtEnd,
+    PoseStep,
     TypedAngles,
     composed,
     parse_fractions,
@@ -31,7 +31,7 @@ def end(angles, xyz, typed=None):
     pose = np.eye(4)
     pose[:3, :3] = Rotation.from_euler("ZYZ", angles).as_matrix()
     pose[:3, 3] = xyz
-    return PoseAtEnd(pose, typed)
+    return PoseStep(pose, typed=typed)
 
 
 @given(a=ANGLES, b=ANGLES, way=st.sampled_from(["line", "screw"]))
@@ -97,13 +97,15 @@ def test_angles_about_fixed_axes_are_not_those_about_current_ones():
     fixed = [end((0, 0, 0), [0, 0, 0], TypedAngles("XYZ", "fixed", each)) for each in (a, b)]
     for each, angles in zip(fixed, (a, b), strict=True):
         each.pose[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()  # lower case: about fixed axes
-    current = PoseAtEnd(fixed[0].pose, TypedAngles("XYZ", "current", (9.0, 9.0, 9.0)))  # not of this frame
+    current = PoseStep(
+        fixed[0].pose, typed=TypedAngles("XYZ", "current", (9.0, 9.0, 9.0))
+    )  # not of this frame
     for start in (fixed[0], current):
         poses = pose_path(start, fixed[1], S, "line", "euler")
         for s, pose in zip(S, poses, strict=True):
             angles = (1 - s) * np.array(a) + s * np.array(b)
             assert pose[:3, :3] == pytest.approx(Rotation.from_euler("xyz", angles).as_matrix(), abs=1e-12)
-    plain = [PoseAtEnd(each.pose, None) for each in fixed]
+    plain = [PoseStep(each.pose) for each in fixed]
     for euler, text in ((("ZYX", "fixed"), "zyx"), (("ZYX", "current"), "ZYX"), (None, "xyz")):
         middle = pose_path(*plain, np.array([0.5]), "line", "euler", euler)[0, :3, :3]
         triples = [Rotation.from_matrix(each.pose[:3, :3]).as_euler(text) for each in fixed]

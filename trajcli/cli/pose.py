@@ -13,7 +13,7 @@ from trajcli.geometry.rotation import rotation_defect
 from trajcli.job.inline import inline_number
 from trajcli.queries.arm import parse_units
 from trajcli.queries.pose import (
-    PoseAtEnd,
+    PoseStep,
     composed,
     parse_fractions,
     parse_sequence,
@@ -51,7 +51,7 @@ def run_pose(options: PoseCommand) -> int:
     s = parse_fractions("0,0.5,1" if options.s is None else options.s)
     poses = pose_path(
         start,
-        PoseAtEnd(target.pose, target.typed),
+        target,
         s,
         options.path or "line",
         options.orientation or "axis_angle",
@@ -70,12 +70,12 @@ def run_pose(options: PoseCommand) -> int:
     return 0
 
 
-def _start(options: PoseCommand, units: Units) -> PoseAtEnd:
+def _start(options: PoseCommand, units: Units) -> PoseStep:
     steps = read_steps(options.steps, units)
     pose = composed(steps)
     if options.inverse:
-        return PoseAtEnd(invert(pose), None)
-    return PoseAtEnd(pose, steps[0].typed if len(steps) == 1 else None)
+        return PoseStep(invert(pose))
+    return PoseStep(pose, typed=steps[0].typed if len(steps) == 1 else None)
 
 
 def _point(text: str, units: Units) -> list[float]:

@@ -14,7 +14,7 @@ from trajcli.frozen import frozen
 from trajcli.geometry.euler import rpy_from_matrix
 from trajcli.job.dump import mapping_text, robot_as_mapping
 from trajcli.job.measurements import read_configurations, read_measurements
-from trajcli.job.robot import RobotSheet
+from trajcli.job.robot import DH_ROW, RobotSheet
 from trajcli.job.yaml.load import parse_document
 from trajcli.kinematics.calibration.fit import Fit, Options, calibrate
 from trajcli.kinematics.calibration.identifiability import Identifiability, Share
@@ -37,16 +37,9 @@ from trajcli.kinematics.calibration.uncertainty import Uncertainty, uncertainty
 from trajcli.kinematics.dexterity import characteristic_length
 from trajcli.kinematics.robot import Joint, Robot
 from trajcli.queries.arm import ArmInUnits, beyond_two_turns
-from trajcli.units import Dimension, Quantity, Units, factor
+from trajcli.units import Units, to_user
 from trajcli.version import __version__
 
-_ROW: dict[str, Dimension] = {
-    "theta": "angle",
-    "d": "length",
-    "a": "length",
-    "alpha": "angle",
-    "beta": "angle",
-}
 _UNMOVED = 1e-9  # rad or m: what a joint that stands still may differ by
 
 
@@ -116,8 +109,7 @@ def calibration_of(arm: ArmInUnits, file: str, free: str, options: Options | Non
 
 def _remarks_on_units(arm: ArmInUnits, measurements: Measurements) -> Iterator[str]:
     """Yield what wrong units, or poses in another frame, look like."""
-    units = [arm.joint_unit(joint) for joint in range(len(arm.robot.joints))]
-    turns = beyond_two_turns(arm.robot, measurements.joints, units)
+    turns = beyond_two_turns(arm.robot, measurements.joints, arm.joint_units)
     if turns is not None:
         yield turns
     length, (missed, _) = characteristic_length(arm.robot), measurements.root_mean_squares(arm.robot)
@@ -257,26 +249,22 @@ def calibrated_text(calibration: Calibration, sheet: RobotSheet) -> str:
     for key in ("base", "tool"):
         pose = getattr(robot, key)
         if not np.array_equal(pose, getattr(sheet.robot, key)):
-            xyz = [_in_units(entry, "length", sheet.units) for entry in pose[:3, 3].tolist()]
+            xyz = [to_user(entry, DH_ROW["d"], sheet.units) for entry in pose[:3, 3].tolist()]
             turns = rpy_from_matrix(pose[:3, :3]).angles.tolist()
-            plain[key] = {"xyz": xyz, "rpy": [_in_units(turn, "angle", sheet.units) for turn in turns]}
+            plain[key] = {"xyz": xyz, "rpy": [to_user(turn, DH_ROW["theta"], sheet.units) for turn in turns]}
     return mapping_text(plain)
 
 
 def _written_row(written: dict[str, Any], row: Joint, old: Joint, units: Units) -> dict[str, Any]:
     """Return a joint of a file with the numbers of its row that have changed, in front of its limits."""
     changed = {
-        key: _in_units(getattr(row, key), quantity, units)
-        for key, quantity in _ROW.items()
+        key: to_user(getattr(row, key), quantity, units)
+        for key, quantity in DH_ROW.items()
         if getattr(row, key) != getattr(old, key)
     }
     merged = {**written, **changed}
-    front = [key for key in ("name", "type", *_ROW) if key in merged]
+    front = [key for key in ("name", "type", *DH_ROW) if key in merged]
     return {key: merged[key] for key in [*front, *(key for key in merged if key not in front)]}
-
-
-def _in_units(value: float, dimension: Dimension, units: Units) -> float:
-    return value / factor(Quantity(dimension), units)
 
 
 def _note(calibration: Calibration) -> str:

@@ -69,8 +69,8 @@ class PoseStep:
     """
 
     pose: Array
-    frame: Frame
-    typed: TypedAngles | None
+    frame: Frame = "current"
+    typed: TypedAngles | None = None
 
 
 def read_steps(words: Sequence[str], units: Units) -> list[PoseStep]:
@@ -138,19 +138,6 @@ def _typed(fields: Mapping[str, Any], context: ReadingContext) -> TypedAngles | 
     return TypedAngles(sequence, cast("Frame", frame), (first, middle, last))
 
 
-@frozen
-class PoseAtEnd:
-    """Start or end of an interpolation.
-
-    Attributes:
-        pose: Shape (4, 4).
-        typed: Its orientation where the user wrote it as three angles.
-    """
-
-    pose: Array
-    typed: TypedAngles | None
-
-
 def parse_fractions(text: str) -> Array:
     """Return the values of "0,0.5,1", shape (k,).
 
@@ -172,8 +159,8 @@ def parse_fractions(text: str) -> Array:
 
 
 def pose_path(
-    start: PoseAtEnd,
-    end: PoseAtEnd,
+    start: PoseStep,
+    end: PoseStep,
     s: Array,
     path: PoseInterpolation = "line",
     orientation: OrientationInterpolation = "axis_angle",
@@ -204,7 +191,7 @@ def pose_path(
     return poses
 
 
-def _even_angles(start: PoseAtEnd, end: PoseAtEnd, s: Array, euler: tuple[str, Frame] | None) -> Array:
+def _even_angles(start: PoseStep, end: PoseStep, s: Array, euler: tuple[str, Frame] | None) -> Array:
     sequence, frame = (end.typed.sequence, end.typed.frame) if end.typed else euler or _RPY
     first, last = (_own(side, sequence, frame) for side in (start, end))
     if last is None:
@@ -215,7 +202,7 @@ def _even_angles(start: PoseAtEnd, end: PoseAtEnd, s: Array, euler: tuple[str, F
     return matrix_from_euler(sequence, angles, frame)
 
 
-def _own(side: PoseAtEnd, sequence: str, frame: Frame) -> Array | None:
+def _own(side: PoseStep, sequence: str, frame: Frame) -> Array | None:
     """Return the angles that the user typed in this very sequence."""
     typed = side.typed
     if typed is None or (typed.sequence, typed.frame) != (sequence, frame):

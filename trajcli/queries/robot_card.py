@@ -9,7 +9,7 @@ import numpy as np
 
 from trajcli.curves.piecewise import Array
 from trajcli.frozen import comparable
-from trajcli.job.robot import RobotSheet
+from trajcli.job.robot import DH_ROW, RobotSheet
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.families.choose import method_for
 from trajcli.kinematics.robot import QUANTITIES, Friction, Robot
@@ -137,10 +137,8 @@ def _inverse_card(robot: Robot) -> dict[str, Any]:
 
 def _joint_card(sheet: RobotSheet, index: int) -> dict[str, Any]:
     joint, units = sheet.robot.joints[index], sheet.units
-    angle, length = Quantity("angle"), Quantity("length")
-    row = {"theta": angle, "d": length, "a": length, "alpha": angle}
-    if any(each.beta for each in sheet.robot.joints):
-        row["beta"] = angle
+    tilted = any(each.beta for each in sheet.robot.joints)
+    row = {key: quantity for key, quantity in DH_ROW.items() if tilted or key != "beta"}
     table = {key: round(to_user(getattr(joint, key), quantity, units), 12) for key, quantity in row.items()}
     limits: dict[str, Any] = {}
     for order, quantity in enumerate(QUANTITIES):
