@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import trajcli
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.operations import cut, join, resample, reverse
 from trajcli.editing.writing import write_motion
@@ -110,3 +111,35 @@ def test_new_rows_have_the_decimals_of_a_plan(source: EditedMotion, tmp_path: Pa
     write_motion(resample(source, 300.0), str(tmp_path / "fine.csv"))
     cells = (tmp_path / "fine.csv").read_text(encoding="utf-8").splitlines()[2].split(",")[:-1]
     assert {len(cell.partition(".")[2]) for cell in cells} == {9}
+
+
+FOR_SERVOJ = """
+version: 1
+robot: {joints: 6}
+limits: {velocity: 2, acceleration: 6, jerk: 100}
+start: {joints: [0, 0.4, 0, 0, 0, 0]}
+moves:
+  - {planner: jerk_limited, to: {joints: [1, -1, 0, 0, 0, 0]}, limits: {velocity: 0.8}}
+  - {planner: quintic, to: {joints: [0, 1, 0, 0, 0, 0]}, duration: 2.5}
+when_over_limit: slow
+output: {for: ur-servoj, columns: [t, q, qd, qdd, move]}
+"""
+
+
+def test_rows_for_a_consumer_are_retimed_by_the_limits_of_their_moves(tmp_path: Path) -> None:
+    """They last longer than the motion that the job plans by itself: a file that says its moves is the oracle."""
+    (tmp_path / "job.yaml").write_text(FOR_SERVOJ)
+    plan = trajcli.plan(FOR_SERVOJ)
+    assert plan.trajectory.duration > plan_job(job_from_text(FOR_SERVOJ)).trajectory.duration
+    plan.save(tmp_path / "said.csv")
+    rows = [line.rsplit(",", 1)[0] for line in (tmp_path / "said.csv").read_text().splitlines()]
+    (tmp_path / "silent.csv").write_text("\n".join(rows) + "\n")
+    said, silent = (
+        trajcli.retime(tmp_path / name, job=tmp_path / "job.yaml", fastest=True, per_move=True).stretches
+        for name in ("said.csv", "silent.csv")
+    )
+    assert [(each.moves, each.factor) for each in silent] == [(each.moves, each.factor) for each in said]
+    assert said[1].factor < 0.9
+    (tmp_path / "cut.csv").write_text("\n".join(rows[:-30]) + "\n")
+    with pytest.raises(trajcli.InputError, match="no column `move` and does not last as long as the plan"):
+        trajcli.retime(tmp_path / "cut.csv", job=tmp_path / "job.yaml")

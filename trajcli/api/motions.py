@@ -120,6 +120,7 @@ def retime(
     from trajcli.editing.requirements import kept_limits
     from trajcli.editing.retiming import retime as retimed
     from trajcli.editing.writing import as_read
+    from trajcli.output.delivery.delivered import delivered_as
 
     limits = kept_limits(*(None if name is None else str(name) for name in (job, robot)))
     arm = limits.robot
@@ -130,7 +131,8 @@ def retime(
             joints=arm.joint_names,
             joint_types=arm.joint_types,
             declared=limits.units,
-        )
+        ),
+        delivered_as,
     )
     reader = EditedMotion.as_written if output is None else partial(as_read, path=str(output))
     found, stretches = retimed(

@@ -123,6 +123,7 @@ def run_retime(options: RetimeCommand) -> int:
         TrajcliError: When anything is wrong; then nothing was written.
     """
     from trajcli.editing.retiming import retime
+    from trajcli.output.delivery.delivered import delivered_as
     from trajcli.queries.arm import files_of_arm, stated_units
     from trajcli.streams.byte_source import ByteSource
     from trajcli.streams.reading import refuse_job
@@ -141,7 +142,8 @@ def run_retime(options: RetimeCommand) -> int:
             joints=robot.joint_names,
             joint_types=robot.joint_types,
             declared=stated_units(arm[0] if arm else ""),
-        )
+        ),
+        delivered_as,
     )
     reader = partial(as_read, path=options.output, form=options.form)
     kept = limits.requirements

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from trajcli.editing.edited_motion import EditedMotion
-from trajcli.errors import Amount, InputError, Problem, VerificationError
+from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.judge.motion import Requirements, judge_motion
@@ -18,6 +19,7 @@ from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
+    from trajcli.judge.file import Delivered
     from trajcli.planning.plan import Plan
 
 _RULES = ("continuity", "time", "derivative")
@@ -43,12 +45,29 @@ class KeptLimits:
     say: Callable[[Amount], str]
     plan: Plan | None = None
 
-    def with_moves(self, motion: EditedMotion) -> EditedMotion:
-        """Return a motion whose rows say their moves where the file, or the times of the plan, say them."""
+    def with_moves(self, motion: EditedMotion, delivered: Delivered | None = None) -> EditedMotion:
+        """Return a motion whose rows say their moves where the file, or the times of the plan, say them.
+
+        Args:
+            motion: Any.
+            delivered: Returns the plan of a job for a consumer, for whom these rows may be.
+        """
         from trajcli.judge.file import moves_by_time
 
-        named = moves_by_time(self.plan, (motion.rows,)) if motion.rows.move is None else None
-        return motion if named is None else replace(motion, rows=named(motion.rows))
+        rows, plan = motion.rows, self.plan
+        if rows.move is not None or plan is None:
+            return motion
+        named = moves_by_time(plan, (rows,))
+        differ = len({id(robot) for robot in self.requirements.by_move.values()}) > 1
+        if named is None and delivered is not None and differ:
+            from trajcli.judge.rows.rows_for_consumers import consumers_of_rows
+
+            for made in consumers_of_rows(rows, plan):
+                with suppress(TrajcliError), np.errstate(all="ignore"):
+                    named = moves_by_time(delivered(made.loaded, made.profile, motion.format), (rows,))
+                if named is not None:
+                    break
+        return motion if named is None else replace(motion, rows=named(rows))
 
 
 def kept_limits(job: str | None, robot: str | None) -> KeptLimits:

@@ -22,6 +22,7 @@ from trajcli.judge.rows.planned_rows import halves_of
 from trajcli.planning.plan import Plan
 from trajcli.streams.byte_source import ByteSource
 from trajcli.streams.reading import open_rows_of
+from trajcli.streams.recorded_motion import RecordedMotion
 from trajcli.streams.row_sources import ColumnExtents
 
 _LONGEST = 2.0  # times the motion that the job plans by itself
@@ -87,7 +88,17 @@ def consumers_of(
         field: Of messages with several states, the one that is read.
     """
     ends = _ends_of(source, plan, topic, field)
-    if ends is None or not _fits(ends, plan):
+    return iter(()) if ends is None else _consumers_by(ends, plan)
+
+
+def consumers_of_rows(rows: RecordedMotion, plan: Plan) -> Iterator[RowsForConsumer]:
+    """Yield likewise for all rows of a motion that was read."""
+    duration = float(rows.t[-1] - rows.t[0])
+    return _consumers_by(_Ends(rows.q[0], rows.q[-1], rows.resolution.q, duration, _rate_of(rows.t)), plan)
+
+
+def _consumers_by(ends: _Ends, plan: Plan) -> Iterator[RowsForConsumer]:
+    if not _fits(ends, plan):
         return
     job, rate = plan.loaded.job.model_copy(update={"when_over_limit": "slow"}), ends.rate
     loaded = replace(plan.loaded, job=job)
