@@ -13,6 +13,7 @@ from trajcli.editing.operations import cut, join, resample, reverse
 from trajcli.editing.writing import write_motion
 from trajcli.job.read import job_from_text
 from trajcli.judge.file import CheckOptions, check_file
+from trajcli.output.delivery.delivered import delivered_as
 from trajcli.output.delivery.joined import write_plan
 from trajcli.planning.plan import Plan, plan_job
 from trajcli.units import Units
@@ -126,6 +127,7 @@ output: {for: ur-servoj, columns: [t, q, qd, qdd, move]}
 """
 
 
+@pytest.mark.full
 def test_rows_for_a_consumer_are_retimed_by_the_limits_of_their_moves(tmp_path: Path) -> None:
     """They last longer than the motion that the job plans by itself: a file that says its moves is the oracle."""
     (tmp_path / "job.yaml").write_text(FOR_SERVOJ)
@@ -143,3 +145,16 @@ def test_rows_for_a_consumer_are_retimed_by_the_limits_of_their_moves(tmp_path: 
     (tmp_path / "cut.csv").write_text("\n".join(rows[:-30]) + "\n")
     with pytest.raises(trajcli.InputError, match="no column `move` and does not last as long as the plan"):
         trajcli.retime(tmp_path / "cut.csv", job=tmp_path / "job.yaml")
+
+
+@pytest.mark.full
+def test_a_table_for_a_consumer_is_known_as_a_message(tmp_path: Path) -> None:
+    """A message of its own would hold knots."""
+    lines = FOR_SERVOJ.replace(", move]", "]").splitlines()
+    job = "\n".join(line for line in lines if "quintic" not in line)
+    (tmp_path / "job.yaml").write_text(job)
+    trajcli.plan(job).save(tmp_path / "rows.csv")
+    motion = read_motion(str(tmp_path / "rows.csv"), ReadingOptions(), declared=Units())
+    write_motion(motion, str(tmp_path / "rows.yaml"))
+    options = CheckOptions(job=str(tmp_path / "job.yaml"))
+    assert check_file(str(tmp_path / "rows.yaml"), options, None, delivered_as).judgement.planned_rows

@@ -11,6 +11,8 @@ import pytest
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.requirements import kept_limits, new_jumps, worst_deviation
 from trajcli.errors import InputError
+from trajcli.job.read import LoadedJob
+from trajcli.planning.plan import Plan, plan_job
 
 JOB = """\
 version: 1
@@ -69,6 +71,28 @@ def test_moves_of_rows_are_those_at_their_times_unless_the_file_says_them(tmp_pa
     said = kept.with_moves(read(tmp_path / "said.csv", "t,q1,move\n0,0,1\n0.5,0.05,1\n2,0.2,0\n"))
     assert said.rows.move is not None
     assert said.rows.move.tolist() == [1, 1, 0]
+
+
+def test_moves_of_rows_for_a_consumer_are_at_the_times_of_its_plan(tmp_path: Path) -> None:
+    """It needs 1.5 s for each move; a file of another duration says nothing."""
+    of_move = ", limits: {velocity: 1}"
+    (tmp_path / "job.yaml").write_text(JOB.format(robot="{joints: 1}", limits="", of_move=of_move))
+    kept = kept_limits(str(tmp_path / "job.yaml"), None)
+    asked = []
+
+    def delivered(loaded: LoadedJob, profile: str | None, form: str) -> Plan:
+        asked.append((profile, form))
+        longer = [move.model_copy(update={"duration": 1.5}) for move in loaded.job.moves]
+        return plan_job(replace(loaded, job=loaded.job.model_copy(update={"moves": longer})))
+
+    rows = read(tmp_path / "rows.csv", "t,q1\n0,0\n1.2,0.08\n1.8,0.12\n3,0.2\n")
+    named = kept.with_moves(rows, delivered).rows.move
+    assert named is not None
+    assert named.tolist() == [0, 0, 1, 1]
+    assert asked == [("ros-jtc", "csv")]
+    assert kept.with_moves(rows).rows.move is None
+    other = read(tmp_path / "other.csv", "t,q1\n0,0\n1.2,0.08\n1.8,0.12\n3.1,0.2\n")
+    assert kept.with_moves(other, delivered).rows.move is None
 
 
 def parabolas(path: Path, *signs: float) -> EditedMotion:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from trajcli.judge.rows.planned_rows import RowComparison
     from trajcli.planning.plan import Plan
 
+_MESSAGES = ("ros", "mcap")  # of knots, unless a table was converted to one
 Delivered = Callable[["LoadedJob", str | None, str], "Plan"]
 """Returns the plan of a job for a consumer, by its profile (None for its own), as a format has it."""
 _LARGEST_RATE = 1e9  # rows per second
@@ -201,14 +202,16 @@ def _made_for(
     """
     profile, loaded = consumer
     rows = open_rows_of(source, topic=options.topic, field=options.field, joints=len(given.robot.joints))
-    try:
-        with np.errstate(all="ignore"):
-            other = delivered(loaded, profile, rows.format)
-    except TrajcliError:
-        return None
-    found = _of_plan(other)
-    compared = _compared(source, found, options)
-    return found if compared is not None and compared.planned else None
+    for form in (rows.format, "csv") if rows.format in _MESSAGES else (rows.format,):
+        try:
+            with np.errstate(all="ignore"):
+                found = _of_plan(delivered(loaded, profile, form))
+        except TrajcliError:
+            continue
+        compared = _compared(source, found, options)
+        if compared is not None and compared.planned:
+            return found
+    return None
 
 
 def _opened(source: ByteSource, options: CheckOptions, given: _Given, declared: Units | None) -> MotionFile:
