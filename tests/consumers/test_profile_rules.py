@@ -214,7 +214,7 @@ def test_a_partial_goal_misses_a_joint(missing: int) -> None:
     )
     found = judged(part, "ros-jtc", Surroundings(surroundings(7).joints, HOME[7][others]))
     told = [(each.kind, each.joint, each.message) for each in found.findings]
-    assert told == [("position", None, f"the joint 'joint_{missing + 1}' is missing")]
+    assert told == [("joints", None, f"the joint 'joint_{missing + 1}' is missing")]
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_the_number_of_joints(profile: str, joints: int) -> None:
         (each.rule.split("-", 1)[1], each.severity, each.kind, each.joint, each.value)
         for each in found
         if "joints" in each.rule
-    ] == [("joints", "error", "position", None, joints)]
+    ] == [("joints", "error", "joints", None, joints)]
 
 
 @pytest.mark.parametrize("missing", [np.nan, np.inf, -np.inf])

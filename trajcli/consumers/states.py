@@ -47,7 +47,7 @@ class JointNames(OfFirstRow):
                 self._note(rows, None, f"the joint '{name}' is missing", "a goal names all joints")
 
     def _note(self, rows: RecordedMotion, joint: int | None, message: str, hint: str | None) -> None:
-        fields = {"kind": "position", "value": 1.0, "limit": 0.0, "message": message, "hint": hint}
+        fields = {"kind": "joints", "value": 1.0, "limit": 0.0, "message": message, "hint": hint}
         self.note(rows, None if rows.message_joints else joint, 0, 1.0, fields)
 
 
@@ -60,7 +60,7 @@ class JointCount(OfFirstRow):
         count, wanted = rows.q.shape[1], int(self.number("count"))
         if count != wanted:
             text = f"the rows have {count} joint{'s' * (count != 1)}, and {wanted} are moved"
-            fields = {"kind": "position", "value": float(count), "limit": float(wanted), "message": text}
+            fields = {"kind": "joints", "value": float(count), "limit": float(wanted), "message": text}
             self.note(rows, None, 0, 1.0, {**fields, "hint": "`trajcli profiles` lists other consumers"})
 
 

@@ -38,8 +38,7 @@ _NOISE = 120.0  # last bits of a position at both ends of an interval h: 60 / h^
 
 def may_be_cured(finding: Finding) -> bool:
     """Return whether other rows, or a slower motion, may help against a finding of its kind."""
-    placed = finding.kind == "position" and finding.joint is not None  # a wrong number of joints stays wrong
-    return (placed or finding.kind in {*STRETCHABLE, "deviation"}) and finding.move is not None
+    return finding.kind in {"position", *STRETCHABLE, "deviation"} and finding.move is not None
 
 
 def refuse_braking(plan: Plan, where: str) -> None:
