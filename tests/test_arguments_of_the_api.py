@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 import trajcli
 from tests.cli.running import call
+from trajcli.batches import sweep
 from trajcli.errors import Problem
 
 SLIDE: dict[str, Any] = {
@@ -178,6 +180,21 @@ def test_a_sweep_draws_by_its_seed_and_keeps_its_table(tmp_path: Path) -> None:
         assert row.point.duration == pytest.approx(plan.trajectory.duration, rel=1e-9)
     trajcli.sweep(job, {"limits.jerk": [40, 20]}, table, processes=1)
     assert table.read_text().count("\n") == 3
+
+
+def test_rows_of_a_sweep_are_in_the_order_of_its_values_whichever_is_done_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = sweep.outcomes_of
+
+    def last_first(*arguments: Any) -> Iterator[Any]:
+        yield from reversed(list(done(*arguments)))
+
+    monkeypatch.setattr(sweep, "outcomes_of", last_first)
+    found = trajcli.sweep(job_file(tmp_path, STEP), {"limits.jerk": [20, 40, 30]}, processes=1)
+    assert [float(row.values[0]) for row in found.rows] == [20, 40, 30]
+    durations = [row.point.duration for row in found.rows]
+    assert durations[0] > durations[2] > durations[1]
 
 
 def test_an_arm_names_its_frames_and_its_solutions_beyond_limits() -> None:

@@ -254,3 +254,23 @@ def test_points_of_all_blocks_count_from_the_start_of_the_motion() -> None:
     points = [message.data for topic, message in messages if topic == "/joint_trajectory_point"]
     begun = [struct.unpack("<iI", data[-8:]) for data in points]
     assert begun == [(0, 0), (1, 250_000_000), (2, 0), (3, 0), (4, 0)]
+
+
+def test_names_in_any_language_are_read_by_others() -> None:
+    """Of joints, of attached files, and what metadata say; the lengths of texts are those of their bytes."""
+    from mcap.reader import make_reader
+
+    names, file = ("ellenbøyle", "手首"), AttachedFile("åpne.yaml", "text/yaml", "é: 1".encode())
+    made = replace(recording(0.5), joint_names=names, attachments=(file,), metadata={"ø": "ü" * 5})
+    data = written(made, rows_at([0.0, 0.25, 0.5]))
+    reader = make_reader(BytesIO(data), validate_crcs=True)
+    (attached,) = reader.iter_attachments()
+    assert (attached.name, attached.data) == (file.name, file.data)
+    (metadata,) = reader.iter_metadata()
+    assert metadata.metadata["ø"] == "ü" * 5
+    states = [message for topic, message in read(data)[0] if topic == "/joint_states"]
+    decoded_states = [decoded(message.data, "sensor_msgs/msg/JointState") for message in states]
+    assert [tuple(each.name) for each in decoded_states] == [names] * 3
+    np.testing.assert_array_equal(
+        [each.position for each in decoded_states], rows_at([0.0, 0.25, 0.5])[:, 1:3]
+    )

@@ -33,15 +33,15 @@ class MessageLayout:
         """The message with all its numbers zero."""
         return bytes(self._bytes)
 
-    def dtype(self, before: int = 0, after: int = 0) -> np.dtype[Any]:
-        """Return the structure of the numbers, with room for some bytes before and behind the message."""
+    def dtype(self, before: int = 0) -> np.dtype[Any]:
+        """Return the structure of the numbers, with space for some bytes before the message."""
         names = list(self._fields)
         return np.dtype(
             {
                 "names": names,
                 "formats": [self._fields[name][0] for name in names],
                 "offsets": [self._fields[name][1] + before for name in names],
-                "itemsize": before + len(self._bytes) + after,
+                "itemsize": before + len(self._bytes),
             }
         )
 
