@@ -319,3 +319,16 @@ def test_answers_are_named_as_far_as_their_arm_has_names_and_the_nearest_to_zero
 def test_lines_are_a_text_and_no_path() -> None:
     with pytest.raises(trajcli.InputError):
         trajcli.plan("moves:\n- hold\n")
+
+
+def test_a_table_of_no_format_is_refused_before_anything_is_planned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(sweep, "outcomes_of", lambda *arguments: asked.append(arguments))
+    with pytest.raises(trajcli.InputError, match="xyz"):
+        trajcli.sweep(
+            job_file(tmp_path, STEP), {"limits.jerk": [20, 40]}, tmp_path / "table.xyz", processes=1
+        )
+    assert asked == []
+    assert not (tmp_path / "table.xyz").exists()
