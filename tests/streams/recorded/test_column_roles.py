@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from trajcli.errors import InputError
+from trajcli.errors import InputError, Place
 from trajcli.streams.recorded.column_roles import NamedFile, assign_roles
 from trajcli.streams.recorded_motion import MotionFile, open_motion
 
@@ -104,3 +104,12 @@ def test_columns_of_one_joint_are_told_apart_by_the_quantity_that_the_hint_names
     roles = assign_roles(file, said)
     assert [names[index] for index in roles.joints[quantity]] == [f"{quantity}1_deg", f"{quantity}2_deg"]
     assert names[roles.joints["q"][0]].startswith("q1")
+
+
+def test_an_error_without_a_place_names_its_file() -> None:
+    place = Place("in.csv", 3, 4)
+    bare, placed = (NamedFile("in.csv", ("t",), lambda name, at=at: at) for at in (None, place))
+    (found,) = bare.wrong("no column", "name one").problems
+    assert (found.message, found.hint, found.place) == ("in.csv: no column", "name one", None)
+    (found,) = placed.wrong("no column").problems
+    assert (found.message, found.hint, found.place) == ("no column", None, place)

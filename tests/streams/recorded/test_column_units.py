@@ -184,3 +184,10 @@ def test_lengths_alone_may_be_said_and_stamps_of_rostopic_too() -> None:
 def test_two_turns_are_the_most_that_is_taken_for_radians(largest: float, guess: str) -> None:
     error = no_unit(NamedFile("rows.csv", ("t", "q1"), lambda name: None), ["q1"], largest)
     assert f"values up to {largest:.3g}: {guess} say it" in str(error.problems[0].hint)
+
+
+@pytest.mark.parametrize("units", ["deg,rad", "m,mm", "ms,us", "deg,deg"])
+def test_two_units_of_one_dimension_are_refused(units: str) -> None:
+    first, second = units.split(",")
+    with pytest.raises(InputError, match=f"--units: {first} and {second} are both units of"):
+        parse_units(units)
