@@ -406,3 +406,23 @@ def test_files_are_judged_in_pages_and_pictures_as_the_commands_do(tmp_path: Pat
     trajcli.plot(job, tmp_path / "marked.svg", over=rows)
     run("plot", str(job), str(rows), "-o", str(tmp_path / "by_command.svg"))
     assert (tmp_path / "marked.svg").read_bytes() == (tmp_path / "by_command.svg").read_bytes()
+
+
+def test_a_format_whose_rows_are_joined_otherwise_than_was_judged_is_refused(tmp_path: Path) -> None:
+    """Cubics keep the steps of a trapezoid; a log has accelerations as well, and quintics pass them."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 2, "acceleration": 8},
+        "start": {"joints": [0]},
+        "moves": [{"planner": "trapezoid", "to": {"joints": [1]}}],
+        "output": {"for": "ros-jtc", "columns": ["t", "q", "qd"], "rows": "knots"},
+    }
+    plan = trajcli.plan(job)
+    for name in ("rows.csv", "rows.npz", "goal.yaml"):
+        plan.save(tmp_path / name)
+        assert (tmp_path / name).exists()
+    with pytest.raises(trajcli.VerificationError, match="the acceleration of j1 reaches") as refused:
+        plan.save(tmp_path / "log.mcap")
+    assert not (tmp_path / "log.mcap").exists()
+    assert abs(refused.value.problems[0].limit or 0.0) == pytest.approx(8, rel=1e-9)

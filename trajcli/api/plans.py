@@ -48,14 +48,25 @@ class PlannedJob(Plan):
                 out, as many as the consumer needs, which are nine unless it is planned for one.
 
         Raises:
-            VerificationError: When the plan breaks a limit; nothing is written.
+            VerificationError: When the plan breaks a limit, or its consumer would by joining the rows of this
+                format; nothing is written.
             InputError: When the ending is that of no format, or digits are other words.
             FileError: When the file cannot be written.
         """
         from trajcli.output.delivery.joined import write_plan
+        from trajcli.streams.formats import format_of
 
         if digits not in (None, "fixed", "full"):
             raise InputError(f"expected fixed or full digits, got {digits!r}")
+        form, consumer = format_of(str(path)), self.loaded.job.output.consumer
+        if consumer is not None and form.content != "rows" and self.verdict.passed:
+            from trajcli.consumers.judgement import load_profile
+            from trajcli.output.delivery.for_consumer import Writing, refusal, rows_for
+
+            made = rows_for(self, load_profile(consumer), Writing(form, digits or self.digits))
+            if made.over:
+                hint = f"it was planned for a table: `trajcli plan --for {consumer} -o` plans for this format"
+                raise refusal(made, (hint,))
         write_plan(self, str(path), digits or self.digits)
 
     def report(self) -> Report:
