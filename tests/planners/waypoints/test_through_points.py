@@ -294,6 +294,18 @@ def test_a_pose_out_of_reach_names_the_waypoint():
         plan_job(job_from_text(json.dumps(job)))
 
 
+@pytest.mark.parametrize("to", [True, False], ids=["to", "without to"])
+@pytest.mark.parametrize("wrong", range(3))
+def test_a_flaw_of_a_point_stands_at_its_field(wrong, to):
+    points = [{"joints": [k + 1, k]} for k in range(3)]
+    points[wrong]["blend"] = 0.1
+    move = {"through": points[:-1], "to": points[-1]} if to else {"through": points}
+    start, move = {"joints": [0, 0]}, {"planner": "time_optimal", **move}
+    (problem,) = refusal(start, move).problems
+    assert problem.place is not None
+    assert problem.place.column == job_text(start, move).index("0.1") + 1
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("planner", PLANNERS)
 @pytest.mark.parametrize("times", ["t,", ""])
