@@ -10,6 +10,7 @@ import pytest
 from planners.test_chains_within_limits import BOUNDS, POINTS, WAYS, arm, line
 from planners.test_motion_of_parts import ruckig_of
 
+from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.third_order.quartic_law import ReversingLawError
 from trajcli.curves.time_optimal.parameterization import UnsettledSpeedError
@@ -178,6 +179,47 @@ def test_of_a_simple_law_and_one_along_the_path_the_faster_one_is_taken(
     else:
         assert isinstance(found, NoLawError)
         assert (found.failing, found.far) == ({2: None}, False)
+
+
+@pytest.mark.parametrize(
+    ("over", "first", "speed", "mended"),
+    [
+        (5e-5, 0.25, 0.2, True),
+        (5e-5, 0.0, 0.0, True),
+        (5e-5, 0.0, 0.2, False),  # a chain starts as it is told
+        (3e-4, 0.25, 0.2, False),  # zones would be flown through from far slower states
+        (-1e-3, 0.25, 0.2, False),
+    ],
+)
+def test_a_law_that_is_over_a_limit_by_little_takes_as_much_longer(
+    over: float, first: float, speed: float, monkeypatch: pytest.MonkeyPatch, *, mended: bool
+) -> None:
+    """Else the whole chain would be searched once more."""
+    course, ends = bent(), states((speed, 0.0), (0.3, -0.1))
+    law = along_path(course, (first, 0.75), ends, 1.0)
+    assert law.law is not None
+
+    def used(curve: PiecewisePolynomial) -> float:
+        """Return by what factor a motion is to be slower, as samples tell."""
+        times = np.linspace(0.0, curve.end, 4001)[:-1]
+        return max(
+            float(np.abs(curve.evaluate(times, order)).max() / bound) ** (1 / order)
+            for order, bound in enumerate(BOUNDS.values(), 1)
+        )
+
+    quicker = (1 + over) / used(law.curve)
+    curve, along = (scale_time(each, 1 / quicker) for each in (law.curve, law.law))
+    monkeypatch.setattr(parts_module, "along_path", lambda *given: FlownPart(curve, None, along))
+    monkeypatch.setattr(parts_module, "_within_tightest", lambda *given: (None, False))
+    found = parts_module._law_between(course, 2, (first, 0.75), ends, 1.0)
+    assert isinstance(found, FlownPart)
+    assert found.law is not None
+    assert found.law.end == found.curve.end
+    if not mended:
+        assert found.curve is curve
+    else:
+        assert used(found.curve) <= 1
+        assert found.curve.end == pytest.approx(curve.end * (1 + over), rel=3e-6)
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 import pytest
 from jerk_paths import both, spline
 
-from trajcli.curves.third_order.convex_step import _of_nodes, _second_order, _third_order, faster
+from trajcli.curves.third_order.convex_step import _of_nodes, _rows, _second_order, _third_order, faster
 from trajcli.curves.third_order.jerk import JointJerkConstraint
 from trajcli.curves.third_order.path_limits import SHARES, LawLimits, sampled
 from trajcli.curves.third_order.quartic_law import QuarticLaw
@@ -141,3 +143,43 @@ def test_a_step_is_at_most_three_times_as_fast_and_less_by_the_tangent_of_jerk()
         b, slope = faster(RESTING, limits, np.ones((3, 4)), 1e-6, np.inf)
         assert b[1:-1] == pytest.approx(fastest, rel=0.01)
         assert np.abs(slope[1:-1] * RESTING.lengths[1:]).max() < 0.2 * fastest
+
+
+def test_rows_of_a_step_are_those_of_each_share_of_an_interval():
+    """Caps at five control points first, one of which is at each end; then accelerations, and jerks at three places."""
+    lowered = 1 + np.random.default_rng(5).uniform(0, 0.5, (3, 4))
+    rows, slack = _rows(MOVING, LIMITS, lowered)
+    assert rows.shape[1:] == slack.shape == (5 + 5 * 4 + 3 * 4, 4)
+    for share, cap in ((0.0, 0), (1.0, 4)):
+        caps, others = _second_order(sampled(MOVING, share), LIMITS.second[0], lowered)
+        for k in range(4):  # those of an end are among the control points; their order is that of nearness
+            np.testing.assert_allclose(rows[:, cap, k], caps[0][:, 0, k], atol=1e-12)
+            for row, left in zip(others[0][:, :, k].T, others[1][:, k], strict=True):
+                assert (
+                    np.abs(np.vstack([rows[:, 5:, k], slack[None, 5:, k]]).T - [*row, left]).max(axis=1).min()
+                    < 1e-12
+                )
+    for share in SHARES:  # control points are those of the quartic through what is sampled
+        bernstein = [comb(4, k) * share**k * (1 - share) ** (4 - k) for k in range(5)]
+        caps, _ = _second_order(sampled(MOVING, share), LIMITS.second[0], lowered)
+        np.testing.assert_allclose(np.einsum("k,ikn->in", bernstein, rows[:, :5]), caps[0][:, 0], atol=1e-12)
+        np.testing.assert_allclose(bernstein @ slack[:5], caps[1][0], atol=1e-12)
+    for share in (0.0, 0.5, 1.0):
+        jerk, left = _third_order(sampled(MOVING, share), LIMITS.third[0], lowered[2])
+        for k in range(4):
+            for row, each in zip(jerk[:, :, k].T, left[:, k], strict=True):
+                assert (
+                    np.abs(np.vstack([rows[:, :, k], slack[None, :, k]]).T - [*row, each]).max(axis=1).min()
+                    < 1e-12
+                )
+
+
+def test_each_limit_has_its_caps_and_of_all_other_rows_the_nearest_count():
+    """Of two limits of acceleration and one of jerk there are 5 + 5 caps, and 52 rows."""
+    tighter = JointConstraint(PATH, 0.1 * VELOCITY, 0.1 * ACCELERATION)
+    limits = LawLimits((LIMITS.second[0], tighter), LIMITS.third)
+    rows, slack = _rows(MOVING, limits, np.ones((3, 4)))
+    assert (rows.shape, slack.shape) == ((4, 46, 4), (46, 4))
+    for k, constraint in enumerate(limits.second):
+        caps, _ = _second_order(sampled(MOVING, 0.0), constraint, np.ones((3, 4)))
+        np.testing.assert_allclose(rows[:, 5 * k], caps[0][:, 0], atol=1e-12)

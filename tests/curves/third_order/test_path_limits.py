@@ -8,7 +8,14 @@ from tiers import few
 
 from trajcli.curves.piecewise import PiecewisePolynomial
 from trajcli.curves.third_order.jerk import JointJerkConstraint, LawJerkConstraint
-from trajcli.curves.third_order.path_limits import SHARES, LawLimits, sampled, time_lost
+from trajcli.curves.third_order.path_limits import (
+    SHARES,
+    LawLimits,
+    all_samples,
+    by_share,
+    sampled,
+    time_lost,
+)
 from trajcli.curves.third_order.quartic_law import QuarticLaw, ReversingLawError
 from trajcli.curves.time_optimal.constraints import JointConstraint
 
@@ -124,3 +131,18 @@ def test_two_nodes_at_one_place_lead_nowhere() -> None:
     twice = QuarticLaw(np.array([0.0, 0.5, 0.5, 1.0]), np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(4))
     with pytest.raises(ReversingLawError, match=r"the law stands at s = .*0\.5"):
         twice.calmed()
+
+
+def test_samples_at_many_shares_are_those_of_each() -> None:
+    many, ends = all_samples(law(), SHARES)
+    assert (many.side, ends.side) == ("right", "left")
+    alone = [sampled(law(), share) for share in SHARES]
+    assert [each.side for each in alone] == ["right"] * 4 + ["left"]
+    for name in ("value", "slope", "bend"):
+        together = by_share((getattr(many, name), getattr(ends, name)), 3)
+        assert together.shape == (4, 5, 3)
+        for k, each in enumerate(alone):
+            np.testing.assert_array_equal(together[:, k], getattr(each, name))
+    for k in range(4):
+        for number, each in enumerate(alone):
+            np.testing.assert_array_equal(by_share((many.state[k], ends.state[k]), 3)[number], each.state[k])

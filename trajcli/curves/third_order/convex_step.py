@@ -18,7 +18,7 @@ Source: Debrouwere et al. (2013); the parameter and the elements are our own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import comb
 
 import numpy as np
@@ -26,7 +26,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.curves.third_order.interior_point import ChainProgram
 from trajcli.curves.third_order.jerk import ThirdOrderConstraint
-from trajcli.curves.third_order.path_limits import SHARES, LawLimits, Sample, sampled
+from trajcli.curves.third_order.path_limits import SHARES, LawLimits, Sample, all_samples, by_share
 from trajcli.curves.third_order.quartic_law import QuarticLaw
 from trajcli.curves.time_optimal.constraints import PathConstraint
 
@@ -37,6 +37,8 @@ _NEAR, _RANKS = 1e-6, 16.0  # distances of rows: the finest, and how many there 
 _TINY = 1e-300
 _FASTEST = 9.0  # b: a law gets no more than three times as fast in a step
 _SLOWEST = 1e-6  # b: it stays positive
+
+_Rows = tuple[Array, Array]
 
 
 def faster(
@@ -54,79 +56,95 @@ def faster(
     """
     h = law.lengths
     scale = np.concatenate([h[:1], 0.5 * (h[1:] + h[:-1]), h[-1:]])  # of b'
-    samples = [sampled(law, share) for share in SHARES]
-    rows, slack = _rows(samples, limits, lowered)
-    values = np.stack([np.broadcast_to(sample.value, (4, h.size)) for sample in samples], axis=1)
+    rows, slack = _rows(law, limits, lowered)
+    values = by_share((sample.value for sample in all_samples(law, SHARES)), h.size)
     rows, values = (_of_nodes(each, law, scale) for each in (rows, values))
     weights = np.outer(_WEIGHTS, h / law.duration)
     change = ChainProgram(values, weights, rows, slack, penalty).minimum(gap)
     return np.maximum(1.0 + change[:, 0], _SLOWEST), change[:, 1] / scale
 
 
-def _rows(samples: Sequence[Sample], limits: LawLimits, lowered: Array) -> tuple[Array, Array]:
+def _rows(law: QuarticLaw, limits: LawLimits, lowered: Array) -> _Rows:
     """Return rows (4, m, N) for Hermite's numbers, and what b = 1 leaves of their limits, (m, N).
 
     Of the many rows of an interval only those count that a change of the unknowns meets first.
     """
-    second = [[_second_order(sample, each, lowered) for sample in samples] for each in limits.second]
-    caps = [row for cap, _ in map(_over_interval, second) for row in cap]
-    others = [row for _, rows in map(_over_interval, second) for row in rows]
-    third = [
-        (each, _third_order(sample, each, lowered[2])) for each in limits.third for sample in samples[::2]
-    ]
-    others += [row for _, row in third]
-    rows, slack = (np.concatenate(parts, axis=-2) for parts in zip(*others, strict=True))
+    caps, others, crowded = list[_Rows](), list[_Rows](), 0
+    inner, ends = all_samples(law, SHARES)
+    for constraint in limits.second:
+        found = [_second_order(sample, constraint, lowered) for sample in (inner, ends)]
+        for kept, parts in zip((caps, others), zip(*found, strict=True), strict=True):
+            kept.append(_of_intervals(parts, lowered.shape[1], throughout=True))
+    inner, ends = all_samples(law, SHARES[::2])
+    for jerk in limits.third:
+        third = [_third_order(sample, jerk, lowered[2]) for sample in (inner, ends)]
+        others.append(_of_intervals(third, lowered.shape[1]))
+        crowded += len(others[-1][1]) if jerk.curved else 0
     # rows of a vector crowd around its direction: they must not take the places of all others
-    kept = _KEPT + sum(len(row[1]) for each, row in third if each.curved) // 2
-    if len(slack) > kept:
-        size = np.sqrt((rows[0] + rows[2]) ** 2 + rows[1] ** 2 + rows[3] ** 2 + _TINY)
-        rank = np.rint(_RANKS * np.arcsinh(slack / size / _NEAR))  # rounding must not choose between equals
-        nearest = np.argsort(rank, axis=0, kind="stable")[:kept]
-        slack = np.take_along_axis(slack, nearest, axis=0)
-        rows = np.take_along_axis(rows, nearest[None], axis=1)
-    cap_rows, cap_slack = (np.concatenate(parts, axis=-2) for parts in zip(*caps, strict=True))
-    return np.concatenate([cap_rows, rows], axis=1), np.concatenate([cap_slack, slack])
+    nearest = _nearest(_joined(others), _KEPT + crowded // 2)
+    return _joined([_joined(caps), nearest])
 
 
-def _over_interval(
-    samples: Sequence[tuple[tuple[Array, Array], tuple[Array, Array]]],
-) -> tuple[list[tuple[Array, Array]], list[tuple[Array, Array]]]:
-    """Return caps and rows of the control points of what was sampled: they bound it throughout."""
-    both = list[list[tuple[Array, Array]]]()
-    for values in zip(*samples, strict=True):
-        rows, slack = (np.stack(each) for each in zip(*values, strict=True))
-        rows, slack = (np.tensordot(_CONTROL, each, axes=1) for each in (rows, slack))
-        both.append(list(zip(rows, slack, strict=True)))
-    return both[0], both[1]
+def _joined(parts: Iterable[_Rows]) -> _Rows:
+    rows, slack = (np.concatenate(each, axis=-2) for each in zip(*parts, strict=True))
+    return rows, slack
 
 
-def _second_order(
-    sample: Sample, constraint: PathConstraint, lowered: Array
-) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+def _nearest(rows: _Rows, count: int) -> _Rows:
+    """Return so many rows of each interval: those that a change of the unknowns meets first."""
+    weights, slack = rows
+    if len(slack) <= count:
+        return rows
+    size = np.sqrt((weights[0] + weights[2]) ** 2 + weights[1] ** 2 + weights[3] ** 2 + _TINY)
+    rank = np.rint(_RANKS * np.arcsinh(slack / size / _NEAR))  # rounding must not choose between equals
+    nearest = np.argsort(rank, axis=0, kind="stable")[:count]
+    return np.take_along_axis(weights, nearest[None], axis=1), np.take_along_axis(slack, nearest, axis=0)
+
+
+def _of_intervals(parts: Sequence[_Rows], count: int, *, throughout: bool = False) -> _Rows:
+    """Return the rows at all samples of `count` intervals, share by share.
+
+    Throughout an interval they are bounded by the control points of what was sampled.
+    """
+    found = []
+    for each in zip(*parts, strict=True):
+        values = np.moveaxis(by_share(each, count), -2, 0)
+        found.append(
+            np.concatenate(np.tensordot(_CONTROL, values, axes=1) if throughout else values, axis=-2)
+        )
+    return found[0], found[1]
+
+
+def _second_order(sample: Sample, constraint: PathConstraint, lowered: Array) -> tuple[_Rows, _Rows]:
     """Return the row of the cap and the others, each with what b = 1 leaves."""
     s, v, a, _ = sample.state
-    given = constraint.rows(s, sample.side)
+    given, (slower, weaker) = constraint.rows(s, sample.side), _at(sample, lowered[:2])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(v > 0, v**2 / given.cap, 0.0)
-    share = np.maximum(share * lowered[0] ** 2, 1.0 / _FASTEST)
+    share = np.maximum(share * slower**2, 1.0 / _FASTEST)
     cap = sample.value[:, None] * share, 1.0 - share[None]
-    limit = (given.c / lowered[1][:, None]).T
+    limit = (given.c / weaker[:, None]).T
     slope = given.a.T * v / limit
     value = (given.a.T * a + given.b.T * v**2) / limit
     rows = 0.5 * slope * sample.slope[:, None] + value * sample.value[:, None]
     return cap, (rows, 1.0 - value)
 
 
-def _third_order(sample: Sample, constraint: ThirdOrderConstraint, lowered: Array) -> tuple[Array, Array]:
+def _third_order(sample: Sample, constraint: ThirdOrderConstraint, lowered: Array) -> _Rows:
     """Return the rows of jerk, with what b = 1 leaves of the tangents."""
     _, v, a, u = sample.state
     given = constraint.rows(sample.state, sample.side)
-    limit = (given.limit / lowered[:, None]).T
+    limit = (given.limit / _at(sample, lowered)[:, None]).T
     first, second, third = given.first.T / limit, given.second.T / limit, given.third.T / limit
     by_bend, by_slope = 0.5 * first * v, 1.5 * (first * a + second * v**2)
     by_value = first * u + 3.0 * second * (v * a) + third * v**3
     rows = by_bend * sample.bend[:, None] + by_slope * sample.slope[:, None]
     return rows + (by_value + 0.5) * sample.value[:, None], 1.0 - by_value
+
+
+def _at(sample: Sample, intervals: Array) -> Array:
+    """Return what is known of N intervals, (..., N), at samples of them, (..., k N)."""
+    return np.tile(intervals, sample.state[0].size // intervals.shape[-1])
 
 
 def _of_nodes(rows: Array, law: QuarticLaw, scale: Array) -> Array:

@@ -7,6 +7,8 @@ limits are missed, and less where the acceleration hardly changes in it.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, Side
@@ -43,7 +45,7 @@ class LawLimits:
         return np.concatenate([second, third[None]])
 
     def used(self, sample: Sample) -> tuple[Array, Array]:
-        """Return what is used of any limit at a sample, (N,), and the shares of each row of acceleration."""
+        """Return what is used of any limit at samples, (k N,), and the share of each row of acceleration."""
         s, v, a, u = sample.state
         parts, rows = [np.zeros(s.size)], []
         for constraint in self.second:
@@ -61,14 +63,14 @@ class LawLimits:
 
 @frozen
 class Sample:
-    """The law at the same share of all its intervals; numbers for Hermite's (b, h b', b, h b').
+    """The law at some shares of all its intervals, share by share; numbers for Hermite's (b, h b', b, h b').
 
     Attributes:
-        state: s, sd, sdd and sddd, each (N,).
+        state: s, sd, sdd and sddd, each (k N,).
         side: From which side of breaks the path is seen there.
-        value: Of b, shape (4, 1).
-        slope: Of b', shape (4, N).
-        bend: Of b'', shape (4, N).
+        value: Of b, shape (4, k N).
+        slope: Of b', shape (4, k N).
+        bend: Of b'', shape (4, k N).
     """
 
     state: tuple[Array, Array, Array, Array]
@@ -78,16 +80,29 @@ class Sample:
     bend: Array
 
 
-def sampled(law: QuarticLaw, share: float) -> Sample:
-    """Return the law at a share of its intervals."""
-    x, h = share, law.lengths
+def sampled(law: QuarticLaw, *shares: float) -> Sample:
+    """Return the law at shares of its intervals, their ends seen from inside: 1 comes alone."""
+    x, h = np.array(shares)[:, None], law.lengths
+    ones = np.ones(h.size)
     value = [2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x, 3 * x**2 - 2 * x**3, x**3 - x**2]
     slope = [6 * x**2 - 6 * x, 3 * x**2 - 4 * x + 1, 6 * x - 6 * x**2, 3 * x**2 - 2 * x]
     bend = [12 * x - 6, 6 * x - 4, 6 - 12 * x, 6 * x - 2]
-    side: Side = "left" if share == 1.0 else "right"
-    return Sample(
-        law.states(share), side, np.array(value)[:, None], np.outer(slope, 1 / h), np.outer(bend, 1 / h**2)
-    )
+    side: Side = "left" if shares[-1] == 1.0 else "right"
+    states = [np.concatenate(each) for each in zip(*map(law.states, shares), strict=True)]
+    numbers = (np.array(each) * by for each, by in ((value, ones), (slope, 1 / h), (bend, 1 / h**2)))
+    s, v, a, u = states
+    return Sample((s, v, a, u), side, *(each.reshape(4, -1) for each in numbers))
+
+
+def all_samples(law: QuarticLaw, shares: Sequence[float]) -> tuple[Sample, Sample]:
+    """Return the law at shares of its intervals, the last of which is 1: the inner ones, and the ends."""
+    return sampled(law, *shares[:-1]), sampled(law, shares[-1])
+
+
+def by_share(parts: Iterable[Array], count: int) -> Array:
+    """Return what was found at all samples of `count` intervals, (..., k N) each, as (..., shares, N)."""
+    shaped = (part.reshape(*part.shape[:-1], part.shape[-1] // count, count) for part in parts)
+    return np.concatenate([*shaped], axis=-2)
 
 
 def time_lost(law: QuarticLaw, limits: LawLimits, excess: Array) -> Array:
@@ -98,13 +113,13 @@ def time_lost(law: QuarticLaw, limits: LawLimits, excess: Array) -> Array:
         limits: That it is to keep.
         excess: What it uses of them, shape (3, N).
     """
-    unused, ends = np.zeros(law.lengths.size), list[Array]()
-    for share in SHARES:
-        used, accelerations = limits.used(sampled(law, share))
-        unused += np.clip(1.0 - used, 0.0, 1.0) / len(SHARES)
-        ends.append(accelerations)
-    peak = np.minimum(np.abs(ends).max(axis=(0, 2), initial=_TINY), 1.0)
-    change = np.minimum((np.abs(ends[-1] - ends[0]) / peak[:, None]).max(axis=0, initial=0.0), 1.0)
+    count = law.lengths.size
+    found = zip(*map(limits.used, all_samples(law, SHARES)), strict=True)
+    used, accelerations = (by_share(each, count) for each in found)
+    unused = np.clip(1.0 - used, 0.0, 1.0).mean(axis=0)
+    peak = np.minimum(np.abs(accelerations).max(axis=(1, 2), initial=_TINY), 1.0)
+    steps = np.abs(accelerations[:, -1] - accelerations[:, 0]) / peak[:, None]
+    change = np.minimum(steps.max(axis=0, initial=0.0), 1.0)
     over = (_ORDER_COSTS * np.maximum(excess - 1.0, 0.0)).max(axis=0)
     return np.asarray(law.lengths * (unused * change + over))
 

@@ -38,6 +38,7 @@ _HOPELESS = 1.3  # times a limit after the first steps of a law between states
 _LONGER = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # times what joints need, where they find no common duration
 _LONGEST = 1e9  # s, of what no limit of duration is known
 _SLOWER = 1e-4  # by which speeds at borders may be lower: zones are flown through from what they are
+_MORE = 1e-6  # by which a law is slowed down beyond what is needed
 _FAR, _FAR_SPEED = 1.6, 1.03  # times a limit, a possible speed
 _SAMPLES = 9  # of a straight line, its ends included, at which bounds of its law are looked at
 _CLOSE = 5e-4  # relative: a duration above that within typical bounds at which a law is fast enough
@@ -128,7 +129,25 @@ def _law_between(
         return simple or NoLawError(str(error), {index: error.s}, error.over > _FAR)
     except ReversingLawError as error:
         return simple or NoLawError(str(error), {index: None})
+    if not _starts_in_motion(stretch, states):
+        found = _within_limits(course, found)
     return found if simple is None or found.curve.duration < simple.curve.duration else simple
+
+
+def _starts_in_motion(stretch: tuple[float, float], states: Array) -> bool:
+    """Return whether a law begins with a chain that starts in motion: as it is told."""
+    return bool(states[0, 0]) and not stretch[0]
+
+
+def _within_limits(course: Course, part: FlownPart) -> FlownPart:
+    """Return a motion along a course in more time, its ends too, where it is over a limit by little."""
+    curve = part.curve
+    findings = _findings(curve, MoveInterval(0.0, curve.duration, course.robot, part.tool), 0)
+    over = max((each.factor or np.inf for each in findings), default=1.0)
+    if part.law is None or over > 1 + _SLOWER or over <= 1:
+        return part
+    law, curve = (scale_time(each, over * (1 + _MORE)) for each in (part.law, curve))
+    return FlownPart(curve, course.reference(law), law)
 
 
 def _within_tightest(
@@ -239,7 +258,7 @@ def along_path(course: Course, stretch: tuple[float, float], states: Array, temp
             further=further,
             further_jerk=course.jerk_constraints,
             hopeless=_HOPELESS,
-            slower=0.0 if v0 and not stretch[0] else _SLOWER,  # a chain starts as it is told
+            slower=0.0 if _starts_in_motion(stretch, states) else _SLOWER,
         )
     else:
         solved = time_optimal(path, *bounds, start_velocity=v0, end_velocity=v1, further=further)
