@@ -16,9 +16,10 @@ from trajcli.curves.time_optimal.parameterization import (
     GridSolution,
     PathProblem,
     UnsettledSpeedError,
+    _tightened_solution,
     time_optimal,
 )
-from trajcli.curves.time_optimal.passes import UnlimitedSpeedError
+from trajcli.curves.time_optimal.passes import StandstillError, UnlimitedSpeedError, UnreachableSpeedError
 
 needed = GridSolution.needed.fget
 FROM_REST = 2 * np.sqrt([0.3, 0.3, 0.4])  # over these distances, at 1 m/s^2
@@ -219,3 +220,59 @@ def test_a_limit_that_cannot_be_settled_is_named_where_it_is_passed(monkeypatch:
             polyline([[0.0], [1.0]]), symmetric(9.0), symmetric(9.0), further=[other], start_velocity=0.05
         )
     assert 0.65 < caught.value.s < 0.85
+
+
+class Attempt:
+    """A solution that says only what it takes, and by how much it passes limits in its two intervals."""
+
+    x = np.ones(3)
+
+    def __init__(
+        self, duration: float, needed: float, over: tuple[float, float], following: Any = None
+    ) -> None:
+        self.duration, self.needed, self.following = duration, needed, following
+        self.excess = np.array([[[1.0, 1.0], [1.0 + over[0], 1.0 + over[1]]]])
+        self.even: list[list[bool]] = []
+        self.problem: Any = None
+
+    def tightened(self, factors: np.ndarray, even: np.ndarray) -> Attempt:
+        self.even.append(even.tolist())
+        return self.following or self
+
+
+@pytest.mark.parametrize("rests", [True, False])
+def test_of_motions_that_may_be_stretched_the_fastest_is_kept_else_the_last(rests: bool) -> None:
+    """Limits are lowered in one interval, then in the other; where speeds are given the last one keeps most."""
+    last = Attempt(11.0, 1.05, (0.0, 1e-6))
+    second = Attempt(10.0, 1.02, (0.0, 0.05), last)
+    first = Attempt(10.0, 1.1, (0.2, 0.0), second)
+    for each in (first, second, last):
+        each.problem = SimpleNamespace(rests=rests)
+    given: Any = first
+    best, count = _tightened_solution(given)
+    assert best is (second if rests else last)
+    assert count == 2
+    # from the fourth round on an excess that must go keeps sdd constant; a little is stretched away
+    assert last.even[0] == [False, False]
+    assert last.even[-1] == [False, not rests]
+
+
+@pytest.mark.parametrize("error", [StandstillError(0.0), UnreachableSpeedError("start", 0.0, 1.0, 0.5)])
+def test_what_a_coarse_grid_has_no_room_for_is_tried_on_finer_ones(
+    error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known, sizes = parameterization._solution_on_grid, list[int]()
+
+    def on_grid(problem: PathProblem, grid: np.ndarray, before: Any) -> GridSolution:
+        sizes.append(grid.size - 1)
+        if len(sizes) < 4:
+            raise error
+        return known(problem, grid, before)
+
+    monkeypatch.setattr(parameterization, "_solution_on_grid", on_grid)
+    path, *bounds = curved()
+    assert time_optimal(path, *bounds).trajectory.duration > 0
+    assert sizes[:4] == [sizes[0] * 2**k for k in range(4)]
+    monkeypatch.setattr(parameterization, "_solution_on_grid", lambda *_: (_ for _ in ()).throw(error))
+    with pytest.raises(type(error)):
+        time_optimal(path, *bounds)
