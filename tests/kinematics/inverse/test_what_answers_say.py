@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,12 +11,24 @@ from inverse_arms import arm, gap
 from tiers import few
 
 from trajcli.errors import InputError
+from trajcli.geometry.rotation import exp
+from trajcli.job.robot import load_robot
 from trajcli.kinematics.forward import forward
 from trajcli.kinematics.inverse.solve import reached_if_turned, solve
-from trajcli.kinematics.inverse.target import partial_target
+from trajcli.kinematics.inverse.target import IkTarget, partial_target, pose_target
 from trajcli.kinematics.robot import Robot
 
 PLACE = np.array([0.35, 0.2, 0.3])
+
+
+def turned_down(pose: np.ndarray) -> IkTarget:
+    return partial_target(pose[:3, 3], direction=-pose[:3, 2])
+
+
+def place_of(pose: np.ndarray) -> IkTarget:
+    return partial_target(pose[:3, 3], fixed=(True, False, False))
+
+
 ON_ITS_SIDE = np.array(
     [[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
@@ -109,3 +122,67 @@ def test_a_yaw_of_an_axis_that_is_vertical_at_zero_but_turned_by_a_wrist_is_no_f
     assert vertical
     for axis in vertical:
         assert solve(robot, partial_target(PLACE, yaw=0.3, tool_axis=axis)).fixed_axis is None  # type: ignore[arg-type]
+
+
+class Asked(Exception):  # noqa: N818
+    """What an answer was asked for with."""
+
+
+UR = arm("UR").joints
+NUMERIC = replace(arm("UR"), joints=(*UR[:4], replace(UR[4], a=0.05), UR[5]))  # axes 5 and 6 do not meet
+ROUTES = {
+    "seven joints": ("panda", pose_target, "searched.by_held_joint"),
+    "no closed form": (NUMERIC, pose_target, "searched.by_search"),
+    "a direction of six joints": (arm("UR"), turned_down, "partial_targets.by_postures"),
+    "a place of three in a plane": (arm("planar 3R"), place_of, "searched.by_search"),
+    "suspects": (arm("wrist over elbow"), pose_target, "searched.resolve_suspects"),
+}
+
+
+@pytest.mark.parametrize(("robot", "target_of", "route"), ROUTES.values(), ids=ROUTES)
+def test_tolerance_and_the_configuration_to_be_near_to_reach_whoever_answers(
+    robot: Robot | str, target_of: Any, route: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = load_robot(robot) if isinstance(robot, str) else robot
+    near = np.zeros(len(asked.joints))
+    near[0], near[-1] = 0.25, 0.5
+
+    def answered(*arguments: Any) -> Any:
+        raise Asked(arguments)
+
+    monkeypatch.setattr(f"trajcli.kinematics.inverse.{route}", answered)
+    with pytest.raises(Asked) as caught:
+        solve(asked, target_of(forward(asked, near)), near, tolerance=1e-4)
+    *_, given, tolerance = caught.value.args[0]
+    assert tolerance == 1e-4
+    np.testing.assert_array_equal(given, [near])
+
+
+def test_a_tolerance_is_a_positive_number() -> None:
+    for tolerance in (0.0, -1e-9, np.nan):
+        with pytest.raises(InputError, match="the tolerance must be positive"):
+            solve(arm("UR"), np.eye(4), tolerance=tolerance)
+
+
+@pytest.mark.parametrize("name", ["elbow and pitch", "RRP Stanford"])
+def test_a_pose_that_is_missed_by_less_than_the_tolerance_is_met(name: str) -> None:
+    """Turned by a millionth about an axis about which the arm cannot turn its tool."""
+    robot = arm(name)
+    q = np.array([0.3, 0.6, -0.9, 0.2][: len(robot.joints)])
+    pose = forward(robot, q)
+    axis = pose[:3, :3] @ np.array([0.6, 0.0, 0.8])
+    pose[:3, :3] = exp(1e-6 * axis) @ pose[:3, :3]
+    assert not solve(robot, pose).valid.any()
+    found = solve(robot, pose, q, tolerance=1e-5)
+    np.testing.assert_allclose(found.joints[found.nearest(q)], q, atol=1e-5)
+
+
+def test_an_arm_in_a_slanted_plane_is_searched_where_its_height_is_left_free() -> None:
+    """Twenty degrees are not the plane of x and y: the height of the target says nothing of x and y."""
+    slanted = np.eye(4)
+    slanted[:3, :3] = exp(np.array([np.radians(20.0), 0.0, 0.0]))
+    robot = replace(arm("planar 2R"), base=slanted)
+    q = np.array([0.4, 0.9])
+    position = forward(robot, q)[:3, 3] + [0.0, 0.0, 5.0]
+    found = solve(robot, partial_target(position, fixed=(True, True, False)), q)
+    np.testing.assert_allclose(found.joints[found.nearest(q)], q, atol=1e-9)
