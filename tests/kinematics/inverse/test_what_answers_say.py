@@ -186,3 +186,17 @@ def test_an_arm_in_a_slanted_plane_is_searched_where_its_height_is_left_free() -
     position = forward(robot, q)[:3, 3] + [0.0, 0.0, 5.0]
     found = solve(robot, partial_target(position, fixed=(True, True, False)), q)
     np.testing.assert_allclose(found.joints[found.nearest(q)], q, atol=1e-9)
+
+
+def test_another_orientation_is_no_help_where_the_place_is_reached_outside_the_limits_alone() -> None:
+    """Three links that are almost stretched reach it with the tool outward alone, and with the first joint at 0.1 rad."""
+    free = arm("planar 3R")
+    straight = -free.joints[1].theta
+    pose = forward(free, np.array([0.1, straight + 0.2, 0.1]))
+    pose[:3, :3] = exp(np.array([0.0, 0.0, np.pi])) @ pose[:3, :3]
+    assert not solve(free, pose).valid.any()
+    assert reached_if_turned(free, pose_target(pose))
+    bounds = free.limits.position.copy()
+    bounds[0] = 1.5, 2.0
+    held = replace(free, limits=replace(free.limits, position=bounds))
+    assert not reached_if_turned(held, pose_target(pose))

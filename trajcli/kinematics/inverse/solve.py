@@ -72,11 +72,11 @@ def _singular_and_free(
 
 
 def reached_if_turned(robot: Robot, target: IkTarget) -> bool:
-    """Return whether one target is met where its orientation, if it fixes any of it, is left free."""
+    """Return whether one target is met within the limits where what it fixes of its orientation is free."""
     if target.orientation == "none" or not any(target.position):
         return target.orientation != "none"
     free = partial_target(target.flat().poses[0, :3, 3], fixed=target.position)
-    return bool(solve(robot, free).valid.any())
+    return bool(solve(robot, free).within_limits.any())
 
 
 def _answers(
