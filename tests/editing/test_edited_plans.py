@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -158,3 +160,22 @@ def test_a_table_for_a_consumer_is_known_as_a_message(tmp_path: Path) -> None:
     write_motion(motion, str(tmp_path / "rows.yaml"))
     options = CheckOptions(job=str(tmp_path / "job.yaml"))
     assert check_file(str(tmp_path / "rows.yaml"), options, None, delivered_as).judgement.planned_rows
+
+
+def test_knots_that_cannot_be_faster_name_the_limit_and_not_the_step_that_it_forbids(tmp_path: Path) -> None:
+    """From knot to knot the acceleration changes by as much as the jerk allows: faster, it seems to jump."""
+    limits = {"velocity": 2, "acceleration": 6, "jerk": 100}
+    job: dict[str, Any] = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "start": {"joints": [0]},
+        "limits": limits,
+    }
+    job["moves"] = [{"planner": "jerk_limited", "to": {"joints": [1]}}]
+    (tmp_path / "job.yaml").write_text(json.dumps(job))
+    job["output"] = {"rows": "knots"}
+    trajcli.plan(job).save(tmp_path / "knots.csv", digits="full")
+    (found,) = trajcli.retime(tmp_path / "knots.csv", job=tmp_path / "job.yaml", fastest=True).stretches
+    assert found.factor == pytest.approx(1.0, abs=2e-4)
+    assert found.binding is not None
+    assert (found.binding.kind, abs(found.binding.limit or 0.0)) in [("jerk", 100.0), ("acceleration", 6.0)]

@@ -129,7 +129,7 @@ def _judge_of(requirements: Requirements, *, strict: bool) -> Judge:
                 raise VerificationError(
                     Problem(text, hint, joint=joint, time=finding.time, kind=finding.kind)
                 )
-        return max(wrong, key=lambda finding: finding.factor or np.inf, default=None)
+        return max(wrong, key=lambda finding: finding.factor or 0.0, default=None)  # a jump is a jerk, too
 
     return judge
 
