@@ -76,6 +76,8 @@ def test_a_row_beside_the_period(profile: str, rule: str) -> None:
     assert breach.value == pytest.approx(rows.t[1] + 2e-5)
     assert breach.hint is not None
     assert "align" in breach.hint
+    rate = 500 if profile == "ur-servoj" else 1000
+    assert f"`trajcli resample --rate {rate}` leaves the last row where it stands" in breach.hint
 
 
 def test_stamps_that_are_rounded_are_at_their_period() -> None:

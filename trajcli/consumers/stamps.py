@@ -90,7 +90,8 @@ class ControllerPeriod(_Intervals):
                 "message": f"the row {when(rows, index)} stands {step:.9g} s after the one before it, and "
                 f"the period is {period:g} s",
                 "hint": f"write it at {1 / period:g} Hz, its duration a whole number of periods: "
-                f"`output: {{rate: {1 / period:g}, align: true}}`, or `trajcli resample`",
+                f"`output: {{rate: {1 / period:g}, align: true}}`; `trajcli resample --rate {1 / period:g}` "
+                "leaves the last row where it stands",
             }
 
         self._note(rows, off > rounding, off, first, fields)
