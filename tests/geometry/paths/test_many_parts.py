@@ -15,12 +15,12 @@ POINTS = 90
 
 
 def _wandering(seed: int) -> Chain:
-    """Return a chain of lines with an arc among them, some corners rounded and some sharp."""
+    """Return a chain of lines with two arcs among them, some corners rounded and some sharp."""
     rng = np.random.default_rng(seed)
     points = np.cumsum(rng.normal(size=(POINTS, 3)) * 0.01, axis=0)
     curves = [Line(*pair) for pair in pairwise(points)]
-    where = POINTS // 2
-    curves[where] = Arc.through(points[where], points[where] + [0.0, 0.004, 0.0], points[where + 1])
+    for where in (POINTS // 3, POINTS // 2):
+        curves[where] = Arc.through(points[where], points[where] + [0.0, 0.004, 0.0], points[where + 1])
     radii = np.where(rng.uniform(size=len(curves) - 1) < 0.8, 0.002, 0.0)
     return join(curves, radii)
 
@@ -29,15 +29,19 @@ def _wandering(seed: int) -> Chain:
 def test_values_are_those_of_the_parts(side) -> None:
     chain = _wandering(7)
     assert len(chain.parts) > 64
-    s = np.concatenate([np.random.default_rng(1).uniform(0, chain.length, 400), chain.breaks, [chain.length]])
+    lengths = np.diff(chain.offsets)
+    late = [chain.offsets[:-1] + share * lengths for share in (0.01, 0.9, 0.99, 0.9999)]
+    spread = np.random.default_rng(1).uniform(0, chain.length, 400)
+    s = np.concatenate([spread, chain.breaks, [chain.length], *late])
     found = chain.evaluate(s, side)
     part = np.searchsorted(chain.breaks, s, side)
-    for row, k in enumerate(part.tolist()):
-        local = np.clip(s[row : row + 1] - chain.offsets[k], 0.0, chain.parts[k].length)
-        for column, expected, scale in zip(
-            found, chain.parts[k].evaluate(local, side), (1.0, 1.0, 1e3), strict=True
-        ):
-            np.testing.assert_allclose(column[row], expected[0], rtol=1e-11, atol=1e-12 * scale)
+    assert set(part) == set(range(len(chain.parts)))
+    for k in range(len(chain.parts)):
+        rows = np.flatnonzero(part == k)
+        local = np.clip(s[rows] - chain.offsets[k], 0.0, chain.parts[k].length)
+        expected = chain.parts[k].evaluate(local, side)
+        for column, own, scale in zip(found, expected, (1.0, 1.0, 1e3), strict=True):
+            np.testing.assert_allclose(column[rows], own, rtol=1e-11, atol=1e-12 * scale)
 
 
 def test_the_derivatives_are_those_of_the_position() -> None:
