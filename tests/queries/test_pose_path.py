@@ -50,6 +50,18 @@ def test_ends_are_met_and_the_turning_is_even(a, b, way):
         )
 
 
+@pytest.mark.parametrize("back", [False, True])
+def test_at_gimbal_lock_the_angle_that_is_free_is_that_of_the_other_end(*, back):
+    """As in a move with Euler angles: of roll and yaw at a pitch of 90 degrees only the difference is determined."""
+    locked, typed = np.eye(4), np.eye(4)
+    locked[:3, :3] = Rotation.from_euler("xyz", [0, 90, 0], degrees=True).as_matrix()
+    angles = np.deg2rad([30.0, 40.0, 50.0])
+    typed[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+    ends = PoseStep(locked), PoseStep(typed, typed=TypedAngles("XYZ", "fixed", tuple(angles)))
+    middle = pose_path(*(ends[::-1] if back else ends), np.array([0.5]), "line", "euler")[0, :3, :3]
+    assert middle == pytest.approx(Rotation.from_euler("xyz", [40, 65, 50], degrees=True).as_matrix())
+
+
 @given(a=ANGLES, b=ANGLES)
 @settings(max_examples=30, deadline=None)
 def test_typed_angles_change_evenly(a, b):

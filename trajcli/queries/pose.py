@@ -22,6 +22,8 @@ from trajcli.geometry.euler import (
     matrix_from_euler,
     rpy_from_matrix,
 )
+from trajcli.geometry.paths.euler_interpolation import euler_interpolation
+from trajcli.geometry.paths.orientation import SegmentProgress
 from trajcli.geometry.pose import PoseInterpolation, build, interpolate, invert, transform_points
 from trajcli.geometry.rotation import (
     Frame,
@@ -175,7 +177,8 @@ def pose_path(
         path: "line" for a straight line of the origin, "screw" for constant twist.
         orientation: On a line: about one fixed axis, or "euler" for angles that change evenly, in the
             sequence of the end; where the end was not typed as angles, in that of `euler`, else as rpy. Of
-            angles that were not typed, the triple and the turns nearest to the other end's are taken.
+            angles that were not typed, the triple and the turns nearest to the other end's are taken; at
+            gimbal lock the angle that is free is the other end's.
         euler: Sequence and frame.
 
     Raises:
@@ -187,17 +190,16 @@ def pose_path(
         raise InputError(message, hint="leave one of them out")
     poses = interpolate(ends[0], ends[1], s, path)
     if orientation == "euler":
-        poses[:, :3, :3] = _even_angles(start, end, s, euler)
+        poses[:, :3, :3] = _even_angles(start, end, np.stack(ends)[:, :3, :3], s, euler)
     return poses
 
 
-def _even_angles(start: PoseStep, end: PoseStep, s: Array, euler: tuple[str, Frame] | None) -> Array:
+def _even_angles(
+    start: PoseStep, end: PoseStep, rotations: Array, s: Array, euler: tuple[str, Frame] | None
+) -> Array:
     sequence, frame = (end.typed.sequence, end.typed.frame) if end.typed else euler or _RPY
-    first, last = (_own(side, sequence, frame) for side in (start, end))
-    if last is None:
-        last = _nearest(end.pose, sequence, frame, np.zeros(3) if first is None else first)
-    if first is None:
-        first = _nearest(start.pose, sequence, frame, last)
+    typed = [_own(side, sequence, frame) for side in (start, end)]
+    first, last = euler_interpolation(rotations, SegmentProgress.even(1.0), sequence, frame, typed).angles
     angles = (1.0 - s)[:, None] * first + s[:, None] * last
     return matrix_from_euler(sequence, angles, frame)
 
@@ -208,15 +210,6 @@ def _own(side: PoseStep, sequence: str, frame: Frame) -> Array | None:
     if typed is None or (typed.sequence, typed.frame) != (sequence, frame):
         return None
     return np.array(typed.angles)
-
-
-def _nearest(pose: Array, sequence: str, frame: Frame, aim: Array) -> Array:
-    euler = euler_from_matrix(sequence, pose[:3, :3], frame)
-    turn = 2.0 * np.pi
-    triples: Sequence[Array] = [
-        angles + turn * np.round((aim - angles) / turn) for angles in (euler.angles, euler.alternative)
-    ]
-    return min(triples, key=lambda angles: float(np.abs(angles - aim).max()))
 
 
 def pose_view(pose: Array, units: Units) -> dict[str, Any]:
