@@ -289,3 +289,94 @@ def test_numbers_of_a_slide_are_lengths(entry: str, unit: str, tmp_path: Path) -
 def test_a_number_that_no_robot_has_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected at least 1e-12 rad/s, got 1e-300"):
         load(tmp_path, "joint_limits:\n  turn:\n    max_velocity: 1e-300\n")
+
+
+@pytest.mark.parametrize(
+    ("turn", "velocity"),
+    [(word, 2.0) for word in ("yes", "ON", "on", "true", '"Yes"')]
+    + [(word, inf) for word in ("no", "Off", "off", "false", '"NO"')],
+)
+def test_flags_are_the_words_that_ros_reads(turn: str, velocity: float, tmp_path: Path) -> None:
+    loaded = load(tmp_path, f"joint_limits: {{turn: {{has_velocity_limits: {turn}, max_velocity: 2}}}}\n")
+    assert of_joint(loaded)["velocity"] == [-velocity, velocity]
+
+
+def test_one_end_that_leaves_nothing_of_the_robots_range_is_shown_where_it_stands(tmp_path: Path) -> None:
+    """The robot's own range ends at 170 deg, 2.967 rad."""
+    with pytest.raises(InputError, match="got 3 and 2.96705973") as caught:
+        load(tmp_path, "joint_limits:\n  turn:\n    max_velocity: 1\n    min_position: 3\n")
+    (place,) = (problem.place for problem in caught.value.problems)
+    assert place is not None
+    assert (place.line, place.column) == (4, 19)
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "hint", "at"),
+    [
+        (
+            "a: 1\njoint_limts: {turn: {max_velocity: 1}}\n",
+            "expected a key",
+            "is `joint_limts` meant?",
+            (1, 1),
+        ),
+        ("joint_limits:\n  trun: {max_jerk: 1}\n", "the first is 'trun'", "did you mean 'turn'?", (2, 3)),
+        (
+            "joint_limits:\n  default_velocity_scaling_factor: 1\n  finger: {max_jerk: 1}\n",
+            "the first is 'finger'",
+            "turn, slide",
+            (3, 3),
+        ),
+        (
+            "joint_limits:\n  default_velocity_scaling_factor: 1\n",
+            "no joint has limits here",
+            "turn, slide",
+            (2, 3),
+        ),
+        (
+            "joint_limits:\n  slide: {max_deceleration: 1}\n",
+            "expected a number below 0, got 1",
+            "a deceleration is negative",
+            (2, 29),
+        ),
+        ("joint_limits:\n  slide: {max_deceleration: -1e-300}\n", "at least 1e-12 m/s^2", "", (2, 29)),
+    ],
+)
+def test_what_is_wrong_says_what_is_meant_and_where(
+    tmp_path: Path, text: str, message: str, hint: str, at: tuple[int, int]
+) -> None:
+    with pytest.raises(InputError) as caught:
+        load(tmp_path, text)
+    (problem,) = caught.value.problems
+    assert message in problem.text()
+    assert hint in (problem.hint or "")
+    assert problem.place is not None
+    assert (problem.place.line, problem.place.column) == at
+
+
+def test_an_end_next_to_zero_is_one(tmp_path: Path) -> None:
+    loaded = load(tmp_path, "joint_limits: {slide: {min_position: 1e-300}}\n")
+    assert of_joint(loaded, 1)["position"] == [1e-300, inf]
+
+
+def test_the_note_on_a_deceleration_names_its_joints_in_the_order_of_the_robot(tmp_path: Path) -> None:
+    text = "joint_limits: {slide: {max_deceleration: -2}, turn: {max_deceleration: -6}}\n"
+    (note,) = notes(load(tmp_path, text))
+    wanted = " gives turn, slide a deceleration: this pair of limits is by direction, not by braking"
+    assert note.endswith(wanted)
+
+
+@pytest.mark.parametrize(
+    ("count", "listed"),
+    [(8, "f0, f1, f2, f3, f4, f5, f6, f7"), (11, "f0, f1, f10, f2, f3, f4, f5, f6 and 3 more")],
+)
+def test_a_note_lists_eight_names_and_counts_the_others(count: int, listed: str, tmp_path: Path) -> None:
+    others = "".join(f", f{k}: {{max_jerk: 1}}" for k in reversed(range(count)))
+    loaded = load(tmp_path, f"joint_limits: {{turn: {{max_jerk: 1}}, slide: {{max_jerk: 1}}{others}}}\n")
+    (note,) = notes(loaded)
+    assert f"has limits of {listed}, which the robot does not have: ignored" in note
+
+
+def test_a_joint_of_which_the_file_says_nothing_keeps_its_own(tmp_path: Path) -> None:
+    loaded = load(tmp_path, "joint_limits:\n  turn:\n  slide: {max_velocity: 0.5}\n")
+    assert of_joint(loaded)["velocity"] == pytest.approx(np.deg2rad([-200, 200]))
+    assert of_joint(loaded, 1)["velocity"] == [-0.5, 0.5]

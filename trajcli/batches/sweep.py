@@ -359,7 +359,7 @@ def _points(path: Path) -> dict[str, SweepPoint]:
     points = dict[str, SweepPoint]()
     with suppress(OSError, UnicodeDecodeError):
         for line in path.read_text(encoding="utf-8").splitlines():
-            with suppress(ValueError, TypeError, KeyError):
+            with suppress(ValueError, TypeError, KeyError, AttributeError):
                 value = json.loads(line)
                 inputs = str(value.pop("inputs"))
                 points[inputs] = SweepPoint(**value)
