@@ -303,7 +303,7 @@ def test_flags_are_the_words_that_ros_reads(turn: str, velocity: float, tmp_path
 
 def test_one_end_that_leaves_nothing_of_the_robots_range_is_shown_where_it_stands(tmp_path: Path) -> None:
     """The robot's own range ends at 170 deg, 2.967 rad."""
-    with pytest.raises(InputError, match="got 3 and 2.96705973") as caught:
+    with pytest.raises(InputError, match=r"got 3 and 2\.96705973") as caught:
         load(tmp_path, "joint_limits:\n  turn:\n    max_velocity: 1\n    min_position: 3\n")
     (place,) = (problem.place for problem in caught.value.problems)
     assert place is not None
