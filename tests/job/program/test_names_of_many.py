@@ -168,3 +168,16 @@ def test_a_grid_in_a_grid_is_in_the_axes_of_its_frame_and_is_told_by_both_rounds
     np.testing.assert_allclose(found, wanted, atol=1e-12)
     names = {point for point in loaded.job.points if point.startswith("slot")}
     assert names == {f"slot (slot {k} of 3, work {n} of 2)" for k in (1, 2, 3) for n in (1, 2)}
+
+
+def test_targets_that_are_written_on_one_line_are_each_approached_by_themselves() -> None:
+    """Tools that point down approach from above: 0.1 m along z of world, whatever line the targets stand on."""
+    places = [(0.4, -0.2, 0.2), (0.5, -0.1, 0.25), (0.4, 0.1, 0.3)]
+    moves = ", ".join(
+        f"{{planner: line, to: {{xyz: [{x}, {y}, {z}], rpy: [{np.pi}, 0, 0]}}, approach: 0.1}}"
+        for x, y, z in places
+    )
+    loaded = read("  target in line 5: {joints: 0}\n", f"[{moves}]")
+    found = [move.to.xyz for move in loaded.job.moves]
+    wanted = [(x, y, z + above) for x, y, z in places for above in (0.1, 0.0)]
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
