@@ -91,8 +91,12 @@ def test_a_start_is_a_state_and_may_be_the_first_row_of_a_recording(tmp_path: Pa
         ("{csv: 3}", "expected the path"),
     ):
         (tmp_path / "job.yaml").write_text(text.replace("{csv: rows.csv}", start), encoding="utf-8")
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=said) as caught:
             load_job(tmp_path / "job.yaml")
+        place = caught.value.problems[0].place
+        assert place is not None
+        shown = "start: " + start
+        assert (place.line, place.column) == (3, 1 + shown.index("velocity" if "velocity" in start else "3"))
 
 
 CUBIC = "{planner: cubic, to: {joints: 1}, duration: 1}"
