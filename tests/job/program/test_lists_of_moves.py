@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from trajcli.errors import InputError, Problem
-from trajcli.job.read import LoadedJob, job_from_text
+from trajcli.job.read import LoadedJob, job_from_text, load_job
+from trajcli.output.recording import _job_text
+from trajcli.planning.plan import plan_job
 
 HEAD = """\
 version: 1
@@ -175,3 +179,22 @@ def test_defaults_hold_for_lines_in_rounds_in_the_units_of_the_job() -> None:
         before.to.xyz[2] - after.to.xyz[2] for before, after in zip(moves[::2], moves[1::2], strict=True)
     ]
     assert heights == pytest.approx([-0.05 * np.cos(3)] * 3)
+
+
+def test_the_job_that_a_log_holds_says_what_an_option_has_replaced(tmp_path: Path) -> None:
+    """Read again without the option it is the same motion: 3 moves of 0.1 rad at 0.05 rad/s."""
+    text = """
+        version: 1
+        robot: {joints: 1}
+        limits: {velocity: 1}
+        start: {joints: 0}
+        points: {a: {joints: 0.1}, b: {joints: 0.2}, c: {joints: 0.3}, l: [a, b, c]}
+        moves: [{repeat: l, moves: [{planner: trapezoid, to: l}]}]
+    """
+    (tmp_path / "job.yaml").write_text(
+        text.replace("{velocity: 1}", "{velocity: 1, acceleration: 1}"), "utf-8"
+    )
+    plan = plan_job(load_job(tmp_path / "job.yaml", ["limits.velocity=0.05"]))
+    again = plan_job(job_from_text(_job_text(plan)))
+    each = 0.1 / 0.05 + 0.05 / 1
+    assert [plan.trajectory.duration, again.trajectory.duration] == pytest.approx([3 * each] * 2, rel=1e-9)
