@@ -83,7 +83,7 @@ def to(name: str) -> str:
             "'both' differs from round to round of slot",
             "write it within `repeat: slot`",
         ),
-        (f"[{HOLD}, {{call: b}}]", "{a: [{call: b}], b: [{call: c}], c: [{call: b}]}", "b}], c: [", "", ""),
+        (f"[{HOLD}, {{call: a}}]", "{a: [{call: b}], b: [{call: c}], c: [{call: b}]}", "b}], c: [", "", ""),
         ("[{call: rset}]", f"{{rest: [{HOLD}]}}", "rset", "no sequence 'rset'", "did you mean 'rest'?"),
         ("[{call: zzzz}]", f"{{rest: [{HOLD}]}}", "zzzz", "no sequence 'zzzz'", "rest"),
         ("[{call: rest}]", "", "rest", "no sequence 'rest'", "the job has no `sequences`"),
