@@ -59,6 +59,24 @@ def test_chains_in_any_order_are_products() -> None:
     assert point.configuration.wrist == "flip"
 
 
+def test_each_of_a_chain_of_points_starts_from_the_one_before_it() -> None:
+    """The first is given by its joints, so that all offsets wait for the pose there; the last is read first."""
+    joints, steps = [10.0, -80, 95, -20, 85, 5], ("[30, 0, 0]", "[0, 50, 0]", "[0, 0, -70]")
+    text = "".join(
+        f"  p{k}: {{from: p{k - 1}, offset: {{xyz: {step}}}}}\n"
+        for k, step in reversed([*enumerate(steps, 1)])
+    )
+    moves = "moves: [{planner: quintic, to: p3, duration: 3}]\n"
+    plan = plan_job(job_from_text(f"{HEAD}points:\n{text}  p0: {{joints: {joints}}}\n{moves}"))
+    robot = plan.loaded.robot
+    offset = homogeneous(Rotation.identity(), 0.03, 0.05, -0.07)
+    np.testing.assert_allclose(
+        forward(robot, plan.moves[0].planned.end.position),
+        forward(robot, np.deg2rad(joints)) @ offset,
+        atol=1e-9,
+    )
+
+
 def test_a_displacement_keeps_the_form_of_the_orientation() -> None:
     text = "  a: {xyz: [400, 0, 300], euler: {sequence: ZYZ, angles: [10, 100, 370]}}\n"
     point = points_of(f"{text}  b: {{from: a, offset: {{xyz: [0, 0, 1]}}}}\n")["b"]
