@@ -4,13 +4,13 @@ each job by itself, and counting."""
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Sequence
 from pathlib import Path
 
 import pytest
+from test_sweep import Counted, swept
 
-from trajcli.batches.sweep import PointLedger, Sweep, SweepSetup, axis_of, outcomes_of, parse_axis, sweep_of
-from trajcli.batches.task import JobOutcome, Task, run_task
+from trajcli.batches.sweep import PointLedger, Sweep, axis_of, outcomes_of, parse_axis, sweep_of
+from trajcli.batches.task import JobOutcome
 from trajcli.errors import InputError
 from trajcli.job.read import load_job
 from trajcli.job.yaml.load import parse_document
@@ -35,22 +35,6 @@ def job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.chdir(tmp_path)
     Path("job.yaml").write_text(JOB, "utf-8")
     return "job.yaml"
-
-
-def swept(job: str, *varied: str, samples: int | None = None, seed: int = 0) -> Sweep:
-    return sweep_of(job, Path(job).read_bytes(), [parse_axis(text) for text in varied], samples, seed)
-
-
-class Counted:
-    """Plans points in this process, and counts them."""
-
-    def __init__(self) -> None:
-        self.planned = 0
-
-    def __call__(self, tasks: Sequence[Task], setup: SweepSetup) -> Generator[JobOutcome, None, None]:
-        for task in tasks:
-            self.planned += 1
-            yield run_task(task, setup)
 
 
 def run(sweep: Sweep, table: str | None = None) -> tuple[int, list[JobOutcome]]:

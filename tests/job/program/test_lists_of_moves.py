@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refused_jobs import refused, where
 
-from trajcli.errors import InputError, Problem
 from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.output.recording import _job_text
 from trajcli.planning.plan import plan_job
@@ -37,13 +37,6 @@ def job(moves: str, sequences: str = "", points: str = POINTS) -> str:
 
 def read(moves: str, sequences: str = "") -> LoadedJob:
     return job_from_text(job(moves, sequences))
-
-
-def refused(text: str) -> Problem:
-    with pytest.raises(InputError) as caught:
-        job_from_text(text, "job.yaml")
-    (problem,) = caught.value.problems
-    return problem
 
 
 def to(name: str) -> str:
@@ -106,11 +99,9 @@ def test_what_is_wrong_with_a_list_is_shown_where_it_stands(
     problem = refused(text)
     assert message in problem.text()
     assert hint in (problem.hint or "")
-    place, index = problem.place, text.rindex(at)
-    assert place is not None
-    line = text.count("\n", 0, index) + 1
+    assert problem.place is not None
     if "repeat: }" not in moves:
-        assert (place.line, place.column) == (line, index - text.rfind("\n", 0, index))
+        assert (problem.place.line, problem.place.column) == where(text, at)
 
 
 def test_names_that_go_together_are_at_the_same_number_in_every_round() -> None:

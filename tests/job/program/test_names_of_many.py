@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from refused_jobs import refused, where
 
-from trajcli.errors import InputError, Problem
 from trajcli.job.read import LoadedJob, job_from_text
 
 HEAD = """\
@@ -18,13 +18,6 @@ points:
   corner: {xyz: [0.4, -0.2, 0.2], rpy: [3, 0, 0]}
   other: {xyz: [0.4, 0.3, 0.2], rpy: [3, 0, 0]}
 """
-
-
-def refused(text: str) -> Problem:
-    with pytest.raises(InputError) as caught:
-        job_from_text(text, "job.yaml")
-    (problem,) = caught.value.problems
-    return problem
 
 
 @pytest.mark.parametrize(
@@ -103,10 +96,8 @@ def test_a_flaw_of_what_is_many_is_shown_where_it_stands(
     problem = refused(text)
     assert message in problem.text()
     assert hint in (problem.hint or "")
-    place, index = problem.place, text.rindex(at)
-    assert place is not None
-    line = text.count("\n", 0, index) + 1
-    assert (place.line, place.column) == (line, index - (text.rfind("\n", 0, index)))
+    assert problem.place is not None
+    assert (problem.place.line, problem.place.column) == where(text, at)
 
 
 @pytest.mark.parametrize(
