@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import csv
 import json
+import pickle
 import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -172,6 +174,21 @@ def test_every_text_is_one_short_line() -> None:
     assert repr(plan) == "PlannedJob('ur5e_pick', UR5e, 9 moves, 6.8513 s, verified)"
     assert repr(plan.trajectory) == "Trajectory(6 joints, 9 moves, 6.8513 s)"
     assert repr(robot) == "Arm('UR5e', 6 joints, standard DH rows)"
+
+
+@pytest.mark.parametrize("change", [{}, {"limits": {"velocity": 40}}])
+def test_a_plan_goes_to_another_process_and_back(change: dict[str, object], tmp_path: Path) -> None:
+    """By pickle, as multiprocessing and caches of results do; a deep copy is made in the same manner."""
+    plan = trajcli.plan({**CUBIC, **change})
+    for copied in (pickle.loads(pickle.dumps(plan)), copy.deepcopy(plan)):
+        assert repr(copied) == repr(plan)
+        assert repr(copied.verdict) == repr(plan.verdict)
+        assert copied.report() == plan.report()
+        np.testing.assert_array_equal(copied.trajectory([0.25, 0.75], 1), plan.trajectory([0.25, 0.75], 1))
+        if not change:
+            copied.save(tmp_path / "copied.csv")
+            plan.save(tmp_path / "plan.csv")
+            assert (tmp_path / "copied.csv").read_bytes() == (tmp_path / "plan.csv").read_bytes()
 
 
 def test_a_verdict_says_what_is_wrong() -> None:
@@ -364,6 +381,7 @@ def test_arguments_that_mean_nothing_are_refused(tmp_path: Path) -> None:
         (lambda: trajcli.view(job, page, robot="ur5e"), "robot: it is for files of rows"),
         (lambda: trajcli.view(job, page, meshes=-1), "meshes: expected megabytes, 0 at least, got -1"),
         (lambda: trajcli.resample(table, "100"), "rate: expected rows per second above 0"),  # type: ignore[arg-type]
+        (lambda: trajcli.resample(table, True), "rate: expected rows per second above 0, got True"),
         (lambda: trajcli.plan({"moves": endless}), "more than 100 levels deep"),
     ):
         with pytest.raises(trajcli.InputError, match=re.escape(message)):

@@ -78,7 +78,7 @@ def test_what_is_no_pose_is_refused():
     assert check_pose(A[0]) < 1e-15
     with pytest.raises(InputError, match=r"last row .* it is 0, 0, 0, 2"):
         check_pose(np.diag([1, 1, 1, 2]))
-    with pytest.raises(InputError, match="4x4 finite entries"):
+    with pytest.raises(InputError, match=r"4x4 finite entries, this one has shape \(3, 4\)"):
         check_pose(A[0, :3])
     with pytest.raises(InputError, match="mirrors space"):
         check_pose(np.diag([1, 1, -1, 1]))
@@ -99,7 +99,7 @@ def test_a_last_row_that_is_typed_is_exact_to_a_billionth(column, side):
 def test_a_pose_is_finite_and_its_rotation_is_one(entry):
     pose = np.array(A[0])
     pose[entry] = np.nan
-    with pytest.raises(InputError, match="4x4 finite entries"):
+    with pytest.raises(InputError, match="4x4 finite entries, this one holds one that is not finite"):
         check_pose(pose)
 
 

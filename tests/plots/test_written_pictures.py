@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from threading import Barrier, BrokenBarrierError
+
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from trajcli.errors import InputError
 from trajcli.job.read import job_from_text
 from trajcli.planning.plan import plan_job
+from trajcli.plots import write
+from trajcli.plots.figure import figure_of
 from trajcli.plots.panel import Panel, PanelBlock, Picture, Trace
 from trajcli.plots.write import PICTURE_FORMATS, format_of_picture, rendered, settings, svg_of
 from trajcli.version import __version__
@@ -97,3 +104,22 @@ def test_a_notebook_shows_what_suits_a_plan() -> None:
     assert text.startswith("<?xml")
     for name in ("position", "velocity", "acceleration", "jerk"):
         assert f"j1: {name}" in text
+
+
+def test_two_threads_do_not_draw_at_once(monkeypatch: pytest.MonkeyPatch, files: dict[str, bytes]) -> None:
+    """They would change each other's settings, and leave them changed: these are one set for all threads."""
+    both = Barrier(2)
+    met = []
+
+    def drawn(picture: Picture) -> Figure:
+        with suppress(BrokenBarrierError):
+            both.wait(timeout=0.05)
+            met.append(picture)
+        return figure_of(picture)
+
+    monkeypatch.setattr(write, "figure_of", drawn)
+    before = dict(mpl.rcParams)
+    with ThreadPoolExecutor(2) as threads:
+        assert set(threads.map(lambda _: rendered(PICTURE, "svg"), range(2))) == {files["svg"]}
+    assert not met
+    assert dict(mpl.rcParams) == before

@@ -427,7 +427,7 @@ def _listed(names: Several) -> list[str]:
 
 
 def _is_finite(value: object) -> bool:
-    return isinstance(value, Real) and bool(np.isfinite(float(value)))
+    return not isinstance(value, bool) and isinstance(value, Real) and bool(np.isfinite(float(value)))
 
 
 def _require_positive(name: str, value: float, expected: str) -> None:

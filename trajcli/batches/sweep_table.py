@@ -20,7 +20,7 @@ from trajcli.frozen import frozen
 from trajcli.job.yaml.load import parse_document
 from trajcli.plots.axes import shortened
 from trajcli.plots.legend import COLOURS, LIMIT_COLOUR
-from trajcli.plots.write import figure_bytes, format_of_picture, settings
+from trajcli.plots.write import figure_bytes, format_of_picture
 from trajcli.streams.whole_file import whole_file
 from trajcli.suggest import did_you_mean, valid_names
 
@@ -121,10 +121,7 @@ class SweepTable:
             FileError: When the file cannot be written.
         """
         kind = check_picture(self.paths, str(path))
-        import matplotlib as mpl
-
-        with mpl.rc_context(settings()):
-            content = figure_bytes(_figure(self), kind, _title(self))
+        content = figure_bytes(lambda: _figure(self), kind, _title(self))
         with whole_file(path) as out:
             out.write(content)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from trajcli.limits.tool_bound import ToolPeak
 
 _NO_TOOL_LIMITS = ToolLimits()
-_NO_SURVEYS: Mapping[str, LimitSurvey] = MappingProxyType({})
+_NO_SURVEYS: Mapping[str, LimitSurvey] = {}
 _PART = 0.25  # of that room: a third of it is a third power's
 _NO_HELP = "slowing down does not help"
 _SLOW = "say `when_over_limit: slow`"

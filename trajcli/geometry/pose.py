@@ -42,7 +42,8 @@ def check_pose(matrix: ArrayLike) -> float:
     """
     pose = np.asarray(matrix, dtype=np.float64)
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
-        raise InputError(f"a homogeneous matrix has 4x4 finite entries, this one has shape {pose.shape}")
+        what = f"has shape {pose.shape}" if pose.shape != (4, 4) else "holds one that is not finite"
+        raise InputError(f"a homogeneous matrix has 4x4 finite entries, this one {what}")
     if np.abs(pose[3] - [0.0, 0.0, 0.0, 1.0]).max() > LAST_ROW:
         row = ", ".join(f"{entry:.6g}" for entry in pose[3])
         raise InputError(f"the last row of a homogeneous matrix must be 0, 0, 0, 1, it is {row}")

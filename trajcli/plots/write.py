@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from trajcli.errors import InputError
@@ -18,6 +19,7 @@ from trajcli.version import __version__
 PICTURE_FORMATS = ("svg", "png", "pdf")
 """What pictures can be written as: the endings of their names."""
 
+_ONE_THREAD = Lock()  # the settings of matplotlib are those of all threads
 _DPI = 150.0
 _CREATOR = f"trajcli {__version__}"
 _METADATA: Mapping[str, Mapping[str, str | None]] = {
@@ -66,17 +68,17 @@ def format_of_picture(path: str | None, given: str | None) -> str:
 
 def rendered(picture: Picture, kind: str) -> bytes:
     """Return the bytes of a picture in one of `PICTURE_FORMATS`; the same for the same picture."""
+    return figure_bytes(lambda: figure_of(picture), kind, picture.title)
+
+
+def figure_bytes(draw: Callable[[], Any], kind: str, title: str) -> bytes:
+    """Return the bytes of what draws a figure, with `settings`, in one of `PICTURE_FORMATS`."""
     import matplotlib as mpl
 
-    with mpl.rc_context(settings()):
-        return figure_bytes(figure_of(picture), kind, picture.title)
-
-
-def figure_bytes(figure: Any, kind: str, title: str) -> bytes:  # noqa: ANN401
-    """Return the bytes of a figure in one of `PICTURE_FORMATS`, which was drawn with `settings`."""
     out = io.BytesIO()
     metadata = {**_METADATA[kind], **({"Title": title} if kind != "png" else {})}
-    getattr(_canvas(figure, kind), f"print_{kind}")(out, metadata=metadata)
+    with _ONE_THREAD, mpl.rc_context(settings()):
+        getattr(_canvas(draw(), kind), f"print_{kind}")(out, metadata=metadata)
     return out.getvalue()
 
 
