@@ -197,6 +197,8 @@ def test_a_value_of_the_tool_is_printed_beyond_its_limit_in_its_unit(
 
 def test_a_time_is_told_in_seconds_to_the_nanosecond() -> None:
     assert at_time(1.23456789) == "at t = 1.23456789 s"
+    assert at_time(1_700_000_000.48) == "at t = 1700000000.48 s"  # since 1970: nine digits are whole years
+    assert at_time(-1_700_000_000.123456) == "at t = -1700000000.123456 s"
 
 
 @pytest.mark.parametrize("more", [1e-9, 1e-7])

@@ -18,6 +18,7 @@ FindingSeverity = Literal["error", "warning"]
 Certainty = Literal["exceeded", "within rounding"]
 
 _RATES = ("", "/s", "/s^2", "/s^3")
+_LONG_AGO = 1e6  # s: where clocks count from a year, not from a start
 _UNORDERED = ("jump", "time", "derivative", "start", "end")
 """Kinds whose value is no part of their limit."""
 
@@ -161,7 +162,12 @@ def tool_excess_amounts(
 
 def at_time(time: float) -> str:
     """Return the words that say when, in s from the start of the trajectory."""
-    return f"at t = {time:.9g} s"
+    return f"at t = {time_text(time)} s"
+
+
+def time_text(time: float) -> str:
+    """Return a time, s, with nine digits; of one that is counted from long ago all, to the microsecond."""
+    return f"{time:.9g}" if abs(time) < _LONG_AGO else f"{round(float(time), 6):.16g}"
 
 
 Make = Callable[[int], Finding]

@@ -19,7 +19,7 @@ from trajcli.cli.outcome import (
 )
 from trajcli.cli.terminal import shown_table
 from trajcli.errors import Amount, InputError, Place, Problem, TrajcliError, at_least
-from trajcli.findings import Finding
+from trajcli.findings import Finding, time_text
 from trajcli.judge.file import CheckedFile, CheckOptions, check_file
 from trajcli.judge.judgement import Judgement
 from trajcli.output.annotations import annotations_of, render_annotations
@@ -190,7 +190,7 @@ def _table(checked: CheckedFile, findings: Sequence[Finding]) -> Iterator[list[s
             *of_move,
             _amount(checked, finding, "value", finding.value),
             _amount(checked, finding, "limit", finding.limit),
-            "-" if finding.time is None else f"{finding.time:.9g}",
+            "-" if finding.time is None else time_text(finding.time),
             "-" if finding.row is None else str(finding.row),
             str(finding.count),
             "" if finding.factor is None else at_least(finding.factor),
@@ -201,7 +201,8 @@ def _amount(checked: CheckedFile, finding: Finding, name: str, value: float | No
     amount = finding.amounts.get(name)
     if isinstance(amount, Amount):
         return _say(checked)(amount)
-    return "-" if value is None else number(value)
+    text = time_text if finding.kind == "time" else number
+    return "-" if value is None else text(value)
 
 
 def _say(checked: CheckedFile) -> Callable[[Amount], str]:

@@ -15,6 +15,7 @@ from trajcli.editing.operations import cut, join, resample, reverse
 from trajcli.editing.requirements import kept_limits, refuse_new_jumps, worst_deviation
 from trajcli.editing.writing import as_read, plain_columns, write_motion
 from trajcli.errors import InputError
+from trajcli.findings import time_text
 from trajcli.streams.formats import format_of
 from trajcli.streams.whole_file import refuse_overwriting
 from trajcli.units import Units
@@ -219,7 +220,7 @@ def _check_output(sources: Sequence[str], options: EditCommand, more: Iterable[t
 
 def _extent(motion: EditedMotion) -> str:
     t = motion.rows.t
-    return f"{t.size} rows from {t[0]:.9g} s to {t[-1]:.9g} s"
+    return f"{t.size} rows from {time_text(t[0])} s to {time_text(t[-1])} s"
 
 
 def _say(options: EditCommand, text: str) -> None:

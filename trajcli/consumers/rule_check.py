@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trajcli.consumers.profile import ConsumerRule
 from trajcli.curves.piecewise import Array
-from trajcli.findings import Collector, Finding, FindingSeverity
+from trajcli.findings import Collector, Finding, FindingSeverity, at_time
 from trajcli.frozen import frozen
 from trajcli.kinematics.robot import Limits
 from trajcli.streams.recorded_motion import RecordedMotion
@@ -207,4 +207,4 @@ class OfFirstRow(RuleCheck):
 
 def when(rows: RecordedMotion, index: int) -> str:
     """Return the words that say where in a file a row stands."""
-    return f"at t = {float(rows.t[index]):.9g} s (row {rows.first_row + index})"
+    return f"{at_time(float(rows.t[index]))} (row {rows.first_row + index})"

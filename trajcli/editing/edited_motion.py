@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array, PiecewisePolynomial
 from trajcli.errors import InputError
+from trajcli.findings import time_text
 from trajcli.frozen import frozen
 from trajcli.judge.reconstruction import reconstruct
 from trajcli.kinematics.robot import JointType
@@ -200,9 +201,9 @@ def _whole(file: MotionFile) -> EditedMotion:
         raise InputError(f"{file.source} has {len(rows.t)} row, a motion has two at least")
     late = np.flatnonzero(np.diff(rows.t) <= 0)
     if late.size:
-        row, before, after = int(late[0]) + 2, rows.t[late[0]], rows.t[late[0] + 1]
+        row, before, after = int(late[0]) + 2, *map(time_text, rows.t[late[0] : late[0] + 2])
         raise InputError(
-            f"{file.source}: the time stamp of row {row} is {after:.9g} s, that before it {before:.9g} s",
+            f"{file.source}: the time stamp of row {row} is {after} s, that before it {before} s",
             hint="stamps must increase; `trajcli check` lists all that is wrong with the stamps",
         )
     lost = (f"columns that are left out: {', '.join(file.unread)}",) if file.unread else ()

@@ -15,6 +15,7 @@ from trajcli.columns import EFFORT, JOINT_GROUPS, JOINT_ORDERS, Column
 from trajcli.curves.piecewise import Array
 from trajcli.editing.edited_motion import ORDERS, EditedMotion, rounded
 from trajcli.errors import InputError
+from trajcli.findings import time_text
 from trajcli.grids import ROWS
 from trajcli.knots import Deviation, Knots
 from trajcli.streams.csv import encoder_of
@@ -214,7 +215,7 @@ def _knots(motion: EditedMotion) -> Knots:
 def _recording(motion: EditedMotion, knots: Knots) -> Recording:
     t = motion.rows.t
     if t[0] < 0 or t[-1] > _LATEST:
-        extent = f"{motion.rows.source} goes from {t[0]:.9g} s to {t[-1]:.9g} s"
+        extent = f"{motion.rows.source} goes from {time_text(t[0])} s to {time_text(t[-1])} s"
         raise InputError(f"a log has times from 0 to {_LATEST} s, and {extent}")
     metadata = {
         "version": __version__,

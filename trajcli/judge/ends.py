@@ -7,7 +7,15 @@ from numpy.typing import NDArray
 
 from trajcli.curves.piecewise import Array
 from trajcli.errors import Amount
-from trajcli.findings import Collector, Finding, FindingSeverity, NamedJoints, at_time, excess_amounts
+from trajcli.findings import (
+    Collector,
+    Finding,
+    FindingSeverity,
+    NamedJoints,
+    at_time,
+    excess_amounts,
+    time_text,
+)
 from trajcli.judge.rounding import stated_errors
 from trajcli.kinematics.robot import QUANTITIES
 from trajcli.streams.recorded_motion import Resolution
@@ -181,7 +189,8 @@ def judge_order_of_stamps(
         text = f"the time stamp of row {number} is {time!r}"
         if np.isfinite(time):
             how = "doubled" if time == last else "earlier than the one before"
-            text = f"the time stamp of row {number}, {time:.9g} s, is {how}: the latest is {last:.9g} s"
+            text = f"the time stamp of row {number}, {time_text(time)} s, is {how}: "
+            text += f"the latest is {time_text(last)} s"
         value_and_limit = (time, last) if np.isfinite(time) else (None, None)
         return Finding(
             rule="time",

@@ -27,6 +27,7 @@ _BLOCK = 4096  # rows gathered at a time
 _LONGEST = 1 << 24  # bytes of a line
 _LARGEST_NUMBER = 1e300
 _SHOWN = 200  # characters of a line in a message
+_SECONDS = "header.stamp"
 
 
 def _value(field: RowField, row: list[float]) -> Any:  # noqa: ANN401
@@ -121,7 +122,10 @@ class JsonRows(RowSource):
             if found:
                 self._columns[key] = _length(content)
         self._width = len(names)
-        unread = [key for key in value if key not in self._columns]
+        self._joints = _joints_of(value, self._columns.values())
+        self.joint_names = None if self._joints is None else tuple(self._joints)
+        self.si = _SECONDS in value
+        unread = [key for key in value if key not in self._columns and value[key] != (self._joints or value)]
         self.notes = (f"keys that are not read: {', '.join(unread)}",) if unread else ()
         place = Place(file, first, 1, line[:_SHOWN].decode("utf-8", "replace").rstrip())
         self.named = NamedFile(file, tuple(names), lambda name: place)
@@ -162,7 +166,8 @@ class JsonRows(RowSource):
             row += content if isinstance(content, list) else [content]
         place = Place(file, number, 1)
         lengths = all(_length(value.get(key)) == count for key, count in self._columns.items())
-        if value.keys() != self._keys or not lengths:
+        same = self._joints is None or _joints_of(value, self._columns.values()) == self._joints
+        if value.keys() != self._keys or not lengths or not same:
             raise InputError(Problem("other keys or lists than in the first row", None, place))
         if not all(type(item) in (int, float) and abs(item) <= _LARGEST_NUMBER for item in row):
             raise InputError(Problem("a value is no number", None, place))
@@ -188,7 +193,28 @@ def _object(line: bytes, file: str, number: int) -> dict[str, Any]:
     if not isinstance(value, dict) or not value:
         message = "expected an object of numbers and lists of numbers"
         raise InputError(Problem(message, None, Place(file, number, 1)))
-    return value
+    return _with_seconds(value)
+
+
+def _with_seconds(value: dict[str, Any]) -> dict[str, Any]:
+    """Return a message of ROS with the stamp of its header as a time; any other object as it is."""
+    header = value.get("header")
+    stamp = header.get("stamp") if isinstance(header, dict) else None
+    if not isinstance(stamp, dict):
+        return value
+    seconds, nanoseconds = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs"))
+    if type(seconds) is not int or type(nanoseconds) is not int:
+        return value
+    others = {key: content for key, content in value.items() if key != "header"}
+    return {_SECONDS: seconds + nanoseconds / 1e9, **others}
+
+
+def _joints_of(value: dict[str, Any], lengths: Iterable[int | None]) -> list[str] | None:
+    """Return the names of joints that an object holds beside as many numbers; None where it holds none."""
+    names = value.get("name", value.get("joint_names"))
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        return None
+    return names if len(names) in lengths else None
 
 
 def _length(content: Any) -> int | None:  # noqa: ANN401

@@ -32,7 +32,11 @@ _YAML = (".yaml", ".yml")
 _OF_JOBS = (*_YAML, ".json")
 _PEEKED = 4096  # bytes of standard input that are looked at
 _HEAD = 1 << 16  # bytes of a file that are looked at
-_JOINT_NAMES = re.compile(rb"^[ \t{-]*[\"']?joint_names[\"']?[ \t]*:", re.MULTILINE)
+_JOINT_NAMES = re.compile(  # begins a line, or stands with its points in one, as JSON is written by programs
+    rb"""^[ \t{-]*["']?joint_names["']?[ \t]*:|^[ \t[]*\{.*"joint_names"[ \t]*:.*"points"[ \t]*:""",
+    re.MULTILINE,
+)
+_JSON_ARRAY = re.compile(rb"\s*\[\s*\{")
 _MCAP = b"\x89MCAP0\r\n"
 _BY_FIRST_BYTES = (
     (re.compile(re.escape(_MCAP)), "mcap"),
@@ -49,6 +53,10 @@ _OTHERS = {
     b"PAR1": ("a parquet file", "trajcli.check takes its columns as arrays; or save them as CSV or .npy"),
     b"\x89HDF": ("an HDF5 file", "save its arrays as CSV or .npy"),
     b"PK\x03\x04": ("an archive (.zip, .xlsx)", "save one table of it as CSV, or arrays as .npz"),
+    **dict.fromkeys(
+        (b"\xff\xfe", b"\xfe\xff"),
+        ("text in UTF-16", "`iconv -f UTF-16 -t UTF-8 FILE | trajcli ... -` makes UTF-8 of it"),
+    ),
     b"\x1f\x8b": ("compressed by gzip", "`gunzip -c FILE | trajcli ... -` unpacks it"),
 }
 """Files that are known by their first bytes and are not read: what they are, and what would be read."""
@@ -184,9 +192,14 @@ def format_of_rows(source: ByteSource) -> str:
     if first.startswith(b"{"):
         from trajcli.streams.jsonl import is_json_object
 
-        if is_json_object(first) and not _JOINT_NAMES.match(first):
+        if is_json_object(first) and not _JOINT_NAMES.search(first):
             return "jsonl"
-    return "ros" if _JOINT_NAMES.search(head) else "csv"
+    if _JOINT_NAMES.search(head):
+        return "ros"
+    if _JSON_ARRAY.match(head):
+        hint = "`jq -c '.[]' FILE | trajcli ... -` makes lines of its objects"
+        raise InputError(f"{source.file} is an array in JSON, which is not read", hint=hint)
+    return "csv"
 
 
 def is_log(path: str | Path) -> bool:

@@ -19,6 +19,7 @@ from trajcli.streams.recorded.column_roles import ColumnRoles, assign_roles, ord
 from trajcli.streams.recorded.column_units import (
     ColumnScales,
     is_own_language,
+    no_seconds,
     no_unit,
     parse_units,
     scales_of,
@@ -30,6 +31,7 @@ Names = tuple[str, ...] | None
 _STATES = ("q", "qd", "qdd")
 _LARGEST = 1e100  # of a number in a file, in whatever unit
 _LAST_MOVE = 2.0**53  # a whole number from there on is none that a float64 tells from the next
+_NO_SECONDS = 1000.0  # between rows: so far apart stand those of no arm
 _KEPT = 1 << 23  # numbers that are kept in memory; of a longer file rows are read anew
 
 BLOCK_ROWS = 65536
@@ -179,6 +181,9 @@ class MotionFile:
                 self._kept.append(block)
                 self._kept = self._kept if kept <= _KEPT else None
         self.resolution = self._resolution(everywhere)
+        apart = everywhere.span(self._time) / max(self.rows - 1, 1)
+        if scales.open_time and apart >= _NO_SECONDS:
+            raise no_seconds(self._rows.named, self._rows.named.names[self._taken[self._time]], apart)
 
     def _refuse(self, block: Array, row: int, column: int) -> NoReturn:
         """Refuse a number that no motion has: one that overflows wherever it is used, or a part of a move."""

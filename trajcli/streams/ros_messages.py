@@ -28,7 +28,7 @@ _LARGEST = 64 << 20  # bytes: a text that is larger is no message
 _KEYS = ("positions", "velocities", "accelerations", "effort")
 _LARGEST_NUMBER = 1e300
 _NANOSECONDS = 9  # decimals of a time that is given as sec and nanosec
-_WRAPPERS = ("joint_trajectory", "trajectory", "goal", "planned_trajectory", "robot_trajectory")
+_WRAPPERS = ("joint_trajectory", "trajectory", "goal", "planned_trajectory", "robot_trajectory", "msg")
 _CUT = re.compile(r"^\s*-?\s*'?\.\.\.'?\s*$|, '?\.\.\.'?\s*\]", re.MULTILINE)
 _SHOWN = 40  # characters of a value in a message
 

@@ -46,6 +46,10 @@ class ColumnExtents:
         np.minimum(self._low, low, out=self._low)
         np.maximum(self._high, high, out=self._high)
 
+    def span(self, column: int) -> float:
+        """Return how far the numbers of a column are apart."""
+        return float(self._high[column] - self._low[column])
+
     @property
     def still(self) -> NDArray[np.bool_]:
         """Whether each column shows the same number in all rows, shape (m,)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Sequence
 from typing import BinaryIO
 
@@ -18,7 +19,8 @@ _LOCAL_NUMBER = re.compile(rb"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 _FIRST_DECIMALS = re.compile(
     rb"(?:^|[;\t \"])[+-]?[0-9]*([.,])[0-9]+(?:[eE][+-]?[0-9]+)?(?=[;\t \"\r]|$)", re.MULTILINE
 )
-_COMMENT = (b"#", b"%")
+_COMMENT = (b"#", b"%", b"sep=")  # the last one is Excel's: it says the separator, which is seen anyway
+_QUOTED = re.compile(r'"[^"]*"')
 _HEAD = "a CSV begins with a line of the columns' names"
 
 
@@ -47,7 +49,7 @@ class Header:
         """Return where a name stands, or the whole line."""
         if name not in self.names:
             return Place(self.file, self.line, 1, self.text, max(len(self.text), 1))
-        at = self.text.find(name, _column_of(self.text, self.names.index(name)) - 1)
+        at = self.text.find(name, _cells_of(self.text)[self.names.index(name)][0] - 1)
         return Place(self.file, self.line, max(at, 0) + 1, self.text, max(len(name), 1))
 
 
@@ -60,15 +62,17 @@ def read_header(stream: BinaryIO, file: str) -> tuple[Header, bytes]:
     Raises:
         InputError: When there are none, or one is missing, doubled or a number.
     """
-    line, number, text = _line(stream, file), 1, b""
+    line, number, text = _line(stream, file).removeprefix(BOM_UTF8), 1, b""
     while line.lstrip().startswith(_COMMENT) and number < _MOST_COMMENTS:
-        text = _line(stream, file, number + 1)
-        if not text.lstrip().startswith(_COMMENT) and (not text.strip() or _NUMBER.match(text.lstrip())):
+        behind = [_line(stream, file, number + 1)]
+        while behind[-1] and not behind[-1].strip() and len(behind) < _MOST_COMMENTS:
+            behind.append(_line(stream, file, number + 1))
+        if not behind[-1].strip() or _NUMBER.match(behind[-1].lstrip()):
+            text = b"".join(behind)
             break  # the comment is the line of names
-        line, text, number = text, b"", number + 1
+        line, number = behind[-1], number + len(behind)
     header = _decoded(line, file)
-    plain = header.lstrip().lstrip("#%") if header.lstrip().startswith(("#", "%")) else header
-    names = _names(plain)
+    names = _names(header)
     _refuse_flaws(names, Header(names, header, number, file))
     return Header(names, header, number, file), text
 
@@ -84,7 +88,7 @@ def _line(stream: BinaryIO, file: str, number: int = 1) -> bytes:
 
 def _decoded(line: bytes, file: str) -> str:
     try:
-        return line.decode("utf-8-sig").rstrip("\r\n")
+        return line.decode().rstrip("\r\n")
     except UnicodeDecodeError:
         pass
     if any(byte < 9 or 0x80 <= byte < 0xA0 for byte in line):  # no letters in any code of a byte each
@@ -93,13 +97,11 @@ def _decoded(line: bytes, file: str) -> str:
 
 
 def _names(text: str) -> tuple[str, ...]:
-    """Return the names of a line, by the separator that stands in it."""
-    separator = next((mark for mark in ";,\t" if mark in text), None)
-    parts = text.split(separator) if separator else text.split()
-    names = [name.strip().removeprefix('"').removesuffix('"').strip() for name in parts]
+    """Return the names of a line; "column 1" is the first without one, as that of an index before others."""
+    names = [name.strip().removeprefix('"').removesuffix('"').strip() for _, name in _cells_of(text)]
     while len(names) > 1 and not names[-1]:
         names.pop()
-    return tuple(names) or ("",)
+    return (names[0] or "column 1", *names[1:]) if len(names) > 1 else tuple(names) or ("",)
 
 
 def _refuse_flaws(names: Sequence[str], header: Header) -> None:
@@ -114,19 +116,26 @@ def _refuse_flaws(names: Sequence[str], header: Header) -> None:
         elif name in names[:index]:
             message = f"there are two columns '{name}'"
         if message is not None:
-            place = Place(
-                header.file, header.line, _column_of(header.text, index), header.text, max(len(name), 1)
-            )
+            column = ([at for at, _ in _cells_of(header.text)] or [1])[index]
+            place = Place(header.file, header.line, column, header.text, max(len(name), 1))
             raise InputError(Problem(message, hint, place))
 
 
-def _column_of(text: str, index: int) -> int:
-    """Return where the name of an index begins in a line, from 1."""
-    separator = next((mark for mark in ";,\t" if mark in text), None)
-    if separator is None:
-        spans = [match.start() for match in re.finditer(r"[^#%\s]\S*", text)]
-        return spans[index] + 1 if index < len(spans) else 1
-    return len(separator.join(text.split(separator)[:index])) + (2 if index else 1)
+def _separator(text: str) -> str:
+    """Return what separates the names of a line: the first of some marks that stands outside of quotes."""
+    return next((mark for mark in ";,\t" if mark in _QUOTED.sub("", text)), " ")
+
+
+def _cells_of(text: str) -> list[tuple[int, str]]:
+    """Return the cells of a line of names, each with its column, from 1; marks in quotes separate none."""
+    body = text.lstrip().lstrip("#%") if text.lstrip().startswith(("#", "%")) else text
+    hidden, before = _QUOTED.sub(lambda quoted: "_" * len(quoted[0]), body), len(text) - len(body)
+    separator = _separator(text)
+    if separator == " ":
+        found = [(match.start() + 1, match[0]) for match in re.finditer(r"\S+", hidden)]
+    else:
+        found = list(_split(hidden, separator))
+    return [(before + at, body[at - 1 : at - 1 + len(cell)]) for at, cell in found]
 
 
 @comparable
@@ -203,7 +212,7 @@ def layout_of(names: Sequence[str], header: str, first: bytes, rows: bytes = b""
         rows: More rows; where none of the first has decimals, their first number that has some says what
             stands before these.
     """
-    named = next((mark for mark in ";,\t" if mark in header), " ")
+    named = _separator(header)
     line = first.rstrip(b"\r\n").decode("latin-1")
     for separator in dict.fromkeys((named, ";", ",", "\t", " ")):
         cells = line.split() if separator == " " else line.split(separator)

@@ -195,7 +195,7 @@ class _Assignment:
                 stems = [k for k, read in enumerate(self._names) if match(read.stem) == match(wanted)]
                 if whole:
                     return whole
-                if stems and not single:
+                if len(stems) == 1 or (stems and not single):
                     return stems
         begun = [
             k

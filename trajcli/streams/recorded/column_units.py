@@ -122,12 +122,14 @@ class ColumnScales:
         per_second: Units of the column of time in a second.
         open: Indices of the columns of joints whose unit nothing says.
         notes: Sentences about units that were taken.
+        open_time: Whether nothing says the unit of the times, which are taken for seconds.
     """
 
     factors: Array
     per_second: float
     open: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
+    open_time: bool = False
 
 
 def scales_of(
@@ -166,7 +168,8 @@ def scales_of(
     per_second = _per_second(file, roles, said)
     factors[roles.time] = 1 / per_second
     notes = tuple(_notes(said, plain, declared)) if bare else ()
-    return ColumnScales(factors, per_second, tuple(open_columns), notes)
+    open_time = per_second == 1.0 and said.time is None and plain is None and not roles.names[roles.time].unit
+    return ColumnScales(factors, per_second, tuple(open_columns), notes, open_time)
 
 
 def _notes(said: SaidUnits, plain: Units | None, declared: Units | None) -> Iterator[str]:
@@ -248,6 +251,12 @@ def _per_second(file: NamedFile, roles: ColumnRoles, said: SaidUnits) -> float:
             raise file.wrong(f"the column {name.text}: '{name.unit}' is no unit of time", name=name.text)
         return _PER_SECOND[name.unit]
     return _PER_SECOND[said.time or ("ns" if roles.nanoseconds else "s")]
+
+
+def no_seconds(file: NamedFile, name: str, apart: float) -> InputError:
+    """Return the error about times whose unit nothing says, and which are too far apart to be seconds."""
+    hint = "say it as in --units rad,ns, or --units rad,s where they are seconds"
+    return file.wrong(f"nothing says the unit of {name}: the rows stand {apart:.6g} apart", hint, name)
 
 
 def no_unit(file: NamedFile, names: Sequence[str], largest: float) -> InputError:
