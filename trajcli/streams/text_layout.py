@@ -128,14 +128,14 @@ def _separator(text: str) -> str:
 
 def _cells_of(text: str) -> list[tuple[int, str]]:
     """Return the cells of a line of names, each with its column, from 1; marks in quotes separate none."""
-    body = text.lstrip().lstrip("#%") if text.lstrip().startswith(("#", "%")) else text
-    hidden, before = _QUOTED.sub(lambda quoted: "_" * len(quoted[0]), body), len(text) - len(body)
+    plain = text.lstrip().lstrip("#%") if text.lstrip().startswith(("#", "%")) else text
+    hidden, before = _QUOTED.sub(lambda quoted: "_" * len(quoted[0]), plain), len(text) - len(plain)
     separator = _separator(text)
     if separator == " ":
         found = [(match.start() + 1, match[0]) for match in re.finditer(r"\S+", hidden)]
     else:
         found = list(_split(hidden, separator))
-    return [(before + at, body[at - 1 : at - 1 + len(cell)]) for at, cell in found]
+    return [(before + at, plain[at - 1 : at - 1 + len(cell)]) for at, cell in found]
 
 
 @comparable
