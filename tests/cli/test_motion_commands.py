@@ -327,3 +327,26 @@ def test_advice_for_other_names_is_followed_to_the_letter(names: str, folder: Pa
     np.testing.assert_allclose(poses[:, 1:3], [[0.5, 0], [0, 0.5], [0.2, 0.3]], atol=1e-8)
     for line in words[1:]:
         assert call(capfd, *line).code == 0
+
+
+@pytest.mark.parametrize("ending", ["mcap", "jsonl", "npz"])
+def test_what_decimals_excuse_is_said_where_the_new_file_has_no_such(
+    ending: str, folder: Path, capfd: Capture
+) -> None:
+    """Rows of sin t at 500 Hz with three decimals: what they change by is no velocity of three decimals."""
+    rows = [f"{t:.3f},{np.sin(t):.3f},{np.cos(t):.3f}" for t in (np.arange(200) / 500).tolist()]
+    (folder / "log.csv").write_text("t,q1,qd1\n" + "\n".join(rows) + "\n")
+    remark = "`check` may find what the decimals of this file excuse"
+    (folder / "one.yaml").write_text("joints: 1\n")
+    assert call(capfd, "check", "log.csv", "-r", "one.yaml").code == 0
+    for command in (["convert", "log.csv"], ["slice", "log.csv", "--to", "0.1"]):
+        found = call(capfd, *command, "-o", f"new.{ending}")
+        assert remark in found.err
+        assert "the velocity of j1" in found.err
+        wrong = ending != "jsonl"  # whose numbers show their decimals as well
+        assert call(capfd, "check", f"new.{ending}", "-r", "one.yaml").code == wrong
+        assert call(capfd, *command, "-q", "-o", f"new.{ending}").err == ""
+        found = call(capfd, *command, "-o", "new.csv")
+        assert remark not in found.err
+        assert call(capfd, "check", "new.csv", "-r", "one.yaml").code == 0
+    assert remark not in call(capfd, "convert", "rows.csv", "-o", f"new.{ending}").err  # of a plan

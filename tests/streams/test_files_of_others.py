@@ -52,6 +52,24 @@ def test_names_are_found_behind_marks_comments_and_in_quotes(
     assert caught.value.problems[0].place.line == line  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize(
+    ("text", "message", "line", "column"),
+    [
+        ("# t,q1\n\n", "the file has no rows", 1, 1),
+        ("sep=;\n# t;q1;q1\n0;1;2\n", "there are two columns 'q1'", 2, 8),
+        ('"a,b",t,,q1\n0,1,2,3\n', "column 3 of 4 has no name", 1, 9),
+    ],
+)
+def test_what_is_wrong_with_names_is_said_with_its_place(
+    text: str, message: str, line: int, column: int, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        read_table(written(tmp_path, text))
+    place = caught.value.problems[0].place
+    assert place is not None
+    assert (place.line, place.column) == (line, column)
+
+
 def test_a_name_in_quotes_is_shown_where_it_stands(tmp_path: Path) -> None:
     text = 't,"the joint 1, left [furlong]","joint 2, left [rad]"\n' + PLAIN
     columns = {"t": "t", "q1": "the joint 1, left [furlong]", "q2": "joint 2, left [rad]"}
@@ -141,5 +159,6 @@ def test_times_too_far_apart_to_be_seconds_are_asked_about(units: str, scale: fl
         open_motion(path, units="rad")
     file = open_motion(path, units=units)
     np.testing.assert_allclose(np.diff(file.whole().t), 2e7 * scale, rtol=2e-5)
-    slow = written(tmp_path, "stamp,joint1\n0,0\n999,1\n1998,1\n")
-    assert open_motion(slow, units="rad").whole().t[-1] == 1998
+    for name, step in (("stamp", 999), ("stamp_s", 5000)):
+        slow = written(tmp_path, f"{name},joint1\n0,0\n{step},1\n{2 * step},1\n")
+        assert open_motion(slow, units="rad").whole().t[-1] == 2 * step

@@ -12,7 +12,7 @@ import numpy as np
 from trajcli.cli.outcome import print_remark, refuse_two_inputs
 from trajcli.editing.edited_motion import EditedMotion, ReadingOptions, read_motion
 from trajcli.editing.operations import cut, join, resample, reverse
-from trajcli.editing.requirements import kept_limits, refuse_new_jumps, worst_deviation
+from trajcli.editing.requirements import kept_limits, no_longer_excused, refuse_new_jumps, worst_deviation
 from trajcli.editing.writing import as_read, plain_columns, write_motion
 from trajcli.errors import InputError
 from trajcli.findings import time_text
@@ -206,7 +206,10 @@ def _read(source: str, options: EditCommand, robot: str | None = None, *, si: bo
 
 def _write(motion: EditedMotion, options: EditCommand) -> None:
     notes = write_motion(motion, options.output, options.form)
-    for note in dict.fromkeys([*motion.notes, *notes]):
+    excused = (
+        () if options.quiet else no_longer_excused(motion, as_read(motion, options.output, options.form))
+    )
+    for note in dict.fromkeys([*motion.notes, *notes, *excused]):
         _say(options, f"  {note}")
 
 

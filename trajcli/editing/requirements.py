@@ -128,6 +128,21 @@ def new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMotion) ->
     return [finding.problem(f"{before.rows.source}: {finding.text()}") for finding in found]
 
 
+def no_longer_excused(motion: EditedMotion, read: EditedMotion) -> tuple[str, ...]:
+    """Return the remark that the rounding of a file explains jumps, and that of a new one does not.
+
+    Args:
+        motion: As it was read.
+        read: As it will be read.
+    """
+    before, after = motion.rows.resolution, read.rows.resolution
+    finer = any((getattr(after, name) < getattr(before, name)).any() for name in ("q", "qd", "qdd"))
+    found = new_jumps(motion, read) if finer else ()
+    more = f", and {len(found) - 1} more" if len(found) > 1 else ""
+    text = "`check` may find what the decimals of this file excuse, and those of the new one do not"
+    return (f"{text}: {found[0].text()}{more}",) if found else ()
+
+
 def _kind(finding: Finding) -> tuple[str, str | None, str | None]:
     return finding.kind, finding.quantity, finding.joint
 
