@@ -136,6 +136,9 @@ def test_peaks_are_of_either_sign_and_of_the_target(sign):
     assert far.defect() == pytest.approx(4.0 / 8.0)
     assert far.defect(5.0) == pytest.approx(0.5)
     assert far.defect(2.0) == pytest.approx(1.0)
+    # of a short motion, too: half a second at 2
+    short = chain_of([0.0, sign * 2.0], [sign * 0.5, sign * 2.0], [0.5], [0.0])
+    assert short.defect() == pytest.approx(0.5)
 
 
 def test_coarseness_is_what_a_rounded_break_does_to_the_velocity():

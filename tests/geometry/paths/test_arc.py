@@ -134,12 +134,25 @@ def test_a_flat_arc_keeps_its_digits():
     np.testing.assert_allclose(middle, [0.5, 1e-5, 0], rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("origin", [[0, 0, 0], [2, -3, 1]])
+def test_how_straight_three_points_may_be_does_not_depend_on_where_they_are(origin):
+    flat = np.array([[0, 0, 0], [0.005, 1e-8, 0], [0.01, 0, 0]]) + origin  # 4e-6 rad at the middle
+    assert Arc.through(*flat).radius == pytest.approx(0.005**2 / 2e-8, rel=1e-4)
+    with pytest.raises(PlanningError, match="collinear"):
+        Arc.through(*(np.array([[0, 0, 0], [0.005, 1e-9, 0], [0.01, 0, 0]]) + origin))
+
+
 @pytest.mark.parametrize(
     ("make", "error", "message"),
     [
         (lambda: Arc.through([0, 0, 0], [1, 0, 0], [3, 0, 0]), PlanningError, "collinear: use line"),
         (
             lambda: Arc.through([0, 0, 0], [5, 0, 0], [3, 0, 0]),
+            PlanningError,
+            "via is not between the others",
+        ),
+        (
+            lambda: Arc.through([0, 0, 0], [0.02, 0, 0], [0.01, 0, 0]),
             PlanningError,
             "via is not between the others",
         ),

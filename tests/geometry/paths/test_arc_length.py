@@ -30,6 +30,12 @@ def test_length_and_parameter_of_a_parabola(width):
     assert arc.knots.size < 60
 
 
+def test_along_a_line_the_parameter_is_the_part_of_the_length():
+    arc = ArcLength(np.array([[1.0, 2.0, 2.0], [0.3, 0.0, -0.1]]))
+    s = np.linspace(0, 3, 25)
+    np.testing.assert_allclose(arc.parameter(s), s / 3, rtol=0, atol=1e-15)
+
+
 def wandering(u):
     """Return a rate whose axis turns and whose size changes, rad."""
     return np.stack([3 * np.cos(4 * u), 2 * np.sin(3 * u) + u**2, 4 * u**3 - 1], axis=-1)
