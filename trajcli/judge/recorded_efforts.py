@@ -116,7 +116,7 @@ class _EffortJudge:
     def add(self, joint: int, sign: int, limit: float, peak: EffortPeak) -> None:
         """Add one joint that is over its limit in one direction, by what is certain about it."""
         reached = self._reached(joint, sign)
-        at = self._piece_of(peak.time, reached)
+        at = self._piece_of(peak.time, joint, sign)
         found, stated = self._on_curve(at, joint, peak, self.survey), self._stated_over(joint, sign, limit)
         certain = found.peak.upper_bound - limit > found.rounding
         warned = not self.run.asked and bool(self._lengths[at] <= DENSE) and stated is None
@@ -165,12 +165,15 @@ class _EffortJudge:
         np.maximum.at(reached, self._owners, efforts.max(axis=1))
         return reached
 
-    def _piece_of(self, time: float, reached: Array) -> int:
-        """Return the curved piece of a peak: at a break that of the two which reaches more."""
-        near = _SPACING * float(np.spacing(self.breaks[-1]))
-        low, high = np.searchsorted(self.breaks, [time - near, time + near], "right").tolist()
-        first: int = max(low - 1, 0)
-        return first + int(reached[first : max(high, 1)].argmax())
+    def _piece_of(self, time: float, joint: int, sign: int) -> int:
+        """Return the curved piece of a peak: at a break that of the two which reaches more there."""
+        nodes, near = self.survey.nodes, _SPACING * float(np.spacing(self.breaks[-1]))
+        ends = nodes.starts[:, None] + nodes.lengths[:, None] * np.arange(2.0)
+        efforts = sign * nodes.values[:, [0, -1], joint].sum(axis=2)
+        there = np.where(np.abs(ends - time) <= near, efforts, -np.inf).max(axis=1)
+        if np.isfinite(there.max()):
+            return int(self._owners[there.argmax()])
+        return max(int(np.searchsorted(self.breaks, time, "right")) - 1, 0)
 
     def _on_curve(self, at: int, joint: int, peak: EffortPeak, survey: EffortSurvey) -> _Excess:
         """Return a peak on a curved piece, with what rounding makes of the effort there."""
