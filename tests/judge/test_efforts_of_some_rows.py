@@ -114,6 +114,19 @@ def test_a_short_cubic_hides_no_torque_of_a_long_quintic() -> None:
     assert found.value == pytest.approx(taken.max(), rel=1e-6)
 
 
+def test_nor_does_it_behind_a_pause_and_before_the_long_quintic() -> None:
+    """Rows as above from the last to the first, after a second in which nothing moves."""
+    states = [np.array([1.0055, 1.0055, 1.0, -1.0]), np.zeros(4), np.array([np.nan, np.nan, 0.0, 0.0])]
+    (found,) = efforts(
+        pendulum(0.998 * WEIGHT), np.array([0.0, 1.0, 1.01, 3.01]), states, (0.01, 1e-6, 1e-6), "jtc"
+    )
+    assert (found.severity, found.certainty, found.row) == ("error", "exceeded", 3)
+    q = Polynomial([1.0, 0.0, 0.0, -2.5, 1.875, -0.375])
+    t = np.linspace(0.0, 2.0, 20001)
+    taken = WEIGHT * np.cos(q(t)) + INERTIA * q.deriv(2)(t)
+    assert found.value == pytest.approx(taken.max(), rel=1e-6)
+
+
 @pytest.mark.parametrize("pause", [0, 1, 2])
 def test_of_two_peaks_alike_the_one_that_is_named_is_told_with_its_own_time(pause: int) -> None:
     """Two rows state 10 rad/s^2 where the arm is level; two seconds follow on one of them, 20 ms on the other.
@@ -130,6 +143,26 @@ def test_of_two_peaks_alike_the_one_that_is_named_is_told_with_its_own_time(paus
     (found,) = efforts(pendulum(1.05), t, states, (1e-6, 1e-6, 1e-6), "jtc")
     assert found.value == pytest.approx(WEIGHT + INERTIA * 10.0, rel=1e-6)
     assert (found.time, found.row) in [(0.0, 1), (4.0, 4 + pause)]
+
+
+@SIDES
+@pytest.mark.parametrize(("over", "certain"), [(0.0013, False), (0.0016, True)])
+def test_an_excess_is_as_certain_as_the_rounding_where_it_is(over: float, certain: bool, side: int) -> None:
+    """A pendulum is level in the middle of a second, where its place says least, and turns on ever faster.
+
+    At its end positions are off by 0.01 rad, of which the weight makes 1.4 mN m, more than the 1.2 mN m that
+    the curve is off in the middle. For a second before it turns evenly.
+    """
+    q, ends = Polynomial([3.5 / 128 - 3.5 / 640, -3.5 / 64, 0.0, 0.0, 0.0, 3.5 / 20]), np.array([0.0, 1.0])
+    t = np.linspace(0.0, 1.0, 1001)
+    largest = (WEIGHT * np.cos(q(t)) + INERTIA * q.deriv(2)(t)).max()
+    before = [q(0.0) - q.deriv()(0.0), q.deriv()(0.0), 0.0]
+    states = [np.append(early, q.deriv(k)(ends) if k else q(ends)) for k, early in enumerate(before)]
+    turned = [np.pi - states[0], -states[1], -states[2]] if side < 0 else states
+    bounds = sorted([-side * 9.0, side * (largest - over)])
+    robot = replace(pendulum(9.0), limits=replace(unlimited(1), effort=np.array([bounds])))
+    (found,) = efforts(robot, np.arange(3.0), turned, (0.01, 1e-6, 1e-6), "quintic")
+    assert found.certainty == ("exceeded" if certain else "within rounding")
 
 
 def test_the_mean_of_a_cubic_behind_a_quintic_is_told_in_its_own_middle() -> None:

@@ -115,13 +115,12 @@ class _EffortJudge:
 
     def add(self, joint: int, sign: int, limit: float, peak: EffortPeak) -> None:
         """Add one joint that is over its limit in one direction, by what is certain about it."""
-        reached = self._reached(joint, sign)
         at = self._piece_of(peak.time, joint, sign)
         found, stated = self._on_curve(at, joint, peak, self.survey), self._stated_over(joint, sign, limit)
         certain = found.peak.upper_bound - limit > found.rounding
         warned = not self.run.asked and bool(self._lengths[at] <= DENSE) and stated is None
         if not certain or warned:  # rounding, or dense rows, explain the largest: not what is elsewhere
-            other = self._curve_over(joint, sign, limit, reached) or stated
+            other = self._curve_over(joint, sign, limit) or stated
             if other is not None:
                 found, certain, warned = other, True, False
         self._note(joint, sign, limit, found, "exceeded" if certain else "within rounding", warned=warned)
@@ -158,12 +157,17 @@ class _EffortJudge:
         found = np.searchsorted(self.breaks, nodes.starts + nodes.lengths / 2) - 1
         return np.clip(found, 0, self.curved.size - 1)
 
-    def _reached(self, joint: int, sign: int) -> Array:
-        """Return the largest effort at nodes of each curved piece, in one direction, shape (m,)."""
-        reached = np.full(self.curved.size, -np.inf)
-        efforts = sign * self.survey.nodes.values[:, :, joint].sum(axis=2)
-        np.maximum.at(reached, self._owners, efforts.max(axis=1))
-        return reached
+    def _reached(self, joint: int, sign: int) -> tuple[Array, Array]:
+        """Return the largest effort at nodes of each curved piece, in one direction, and when, (m,) each."""
+        nodes, size = self.survey.nodes, self.curved.size
+        efforts = sign * nodes.values[:, :, joint].sum(axis=2)
+        owners, inside = np.repeat(self._owners, efforts.shape[1]), np.linspace(0.0, 1.0, efforts.shape[1])
+        order = np.lexsort((efforts.ravel(), owners))
+        last = order[np.diff(owners[order], append=size) > 0]
+        reached, local, at = np.full(size, -np.inf), np.zeros(size), owners[last]
+        reached[at] = efforts.ravel()[last]
+        local[at] = (nodes.starts[:, None] + nodes.lengths[:, None] * inside).ravel()[last] - self.breaks[at]
+        return reached, local
 
     def _piece_of(self, time: float, joint: int, sign: int) -> int:
         """Return the curved piece of a peak: at a break that of the two which reaches more there."""
@@ -181,13 +185,14 @@ class _EffortJudge:
         (rounding,) = self._roundings(joint, np.array([at]), np.array([local])).tolist()
         return _Excess(int(self.curved[at]), local, peak, survey, rounding)
 
-    def _curve_over(self, joint: int, sign: int, limit: float, reached: Array) -> _Excess | None:
+    def _curve_over(self, joint: int, sign: int, limit: float) -> _Excess | None:
         """Return the largest effort of the curve that rounding does not explain, where rows are not dense."""
+        reached, local = self._reached(joint, sign)
         over = reached > limit * (1 + EFFORT_RELATIVE)
         if not self.run.asked:
             over &= self._lengths > DENSE
         for some in largest_first(reached, over):
-            certain = reached[some] - limit > self._roundings(joint, some, self._lengths[some] / 2)
+            certain = reached[some] - limit > self._roundings(joint, some, local[some])
             if certain.any():
                 at = int(some[certain.argmax()])
                 peak = _part(self.survey, self._owners == at).peak(joint, sign)
