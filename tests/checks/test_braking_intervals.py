@@ -249,3 +249,15 @@ def test_a_joint_that_rests_and_no_limit_of_jerk_make_no_warning():
     found = braking_intervals(np.array([1.5, 0.75, 0.0]), np.zeros(3), limits, on_line=True)
     assert [(each.joint, each.order) for each in found] == [(0, 1)]
     assert found[0].duration == pytest.approx(0.25)  # (1.5 - 1) / 2
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("acceleration", [0.0, 1.0])
+def test_along_a_line_each_joint_is_excused_up_to_where_the_start_leads_it(acceleration, side):
+    """At 0.5 and -0.25 rad/s, and faster by a^2 / (2 j) where the start has an acceleration; no more than that."""
+    joints = side * np.array([1.0, -0.5])
+    found = braking_intervals(0.5 * joints, acceleration * joints, _limits(velocity=0.2), on_line=True)
+    assert [(each.joint, each.order) for each in found] == [(0, 1), (1, 1)]
+    for each, share in zip(found, joints, strict=True):
+        reached = sorted([0.5 * share, (0.5 + acceleration**2 / (2 * 4.0)) * share])
+        assert [each.lowest, each.highest] == pytest.approx(reached, rel=1e-12)
