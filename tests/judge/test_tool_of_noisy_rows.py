@@ -151,3 +151,22 @@ def test_a_turn_is_told_from_what_a_point_beside_it_does() -> None:
     ):
         verdict, _ = swing("revolute", limit, share, t, NEEDED[limit.removeprefix("angular_")], 4, arm=0.5)
         assert (verdict == "exceeded") == over, limit
+
+
+@pytest.mark.parametrize(("excess", "verdict"), [(0.005, "within rounding"), (0.03, "exceeded")])
+def test_an_acceleration_is_as_certain_as_the_rounding_where_it_is(excess: float, verdict: str) -> None:
+    """A tool at 1 m stops and goes back within 10 s, at 3 rad/s at both ends, where it takes 9 m/s^2 inwards.
+
+    A position is off by 1 mrad: at 3 rad/s that makes 2 w^2 of it, 18 mm/s^2, and where it stands still next to nothing.
+    """
+    speed, t = 3.0, np.array([0.0, 10.0])
+    q, qd, qdd = np.zeros(2), np.array([-speed, speed]), np.full(2, 2 * speed / 10.0)
+    tool = np.eye(4)
+    tool[0, 3] = 1.0
+    bounds = replace(unlimited(1), tcp=ToolLimits(acceleration=float(np.hypot(speed**2, qdd[0])) - excess))
+    robot = Robot("arm", (Joint("a", type="revolute"),), bounds, "standard", np.eye(4), tool)
+    off = [np.full(1, each) for each in (1e-3, 1e-6, 1e-6)]
+    columns = [each[:, None] for each in (q, qd, qdd)]
+    rows = RecordedMotion(t, *columns, None, None, None, None, Resolution(0.0, *off), "rows")
+    needs = Requirements(robot, tool=lambda: ToolJudge(robot), interpolate="quintic")
+    assert judge_motion(lambda: (rows,), needs).verdict == verdict

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from trajcli.curves.node_bound import at_nodes
+from trajcli.curves.node_bound import NODES_DEGREE, at_nodes
 from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.findings import Collector, Finding, FindingMethod, at_time
 from trajcli.frozen import frozen
@@ -214,12 +214,13 @@ class ToolJudge:
         coefficients, lengths = window.coefficients[:, pieces], window.lengths[pieces]
         rates = at_nodes(coefficients, lengths, order)
         vectors = tool_derivatives(robot, rates).reshape(*rates[0].shape[:2], 2 * order, 3)
-        reached = np.linalg.norm(vectors[:, :, 2 * order - 2 + angular], axis=2).max(axis=1)
+        sizes = np.linalg.norm(vectors[:, :, 2 * order - 2 + angular], axis=2)
+        reached, local = sizes.max(axis=1), sizes.argmax(axis=1) * lengths / NODES_DEGREE
         over = (reached > limit * (1 + TOOL_RELATIVE)) & (window.highest[pieces] >= order)
         if not asked:
             over &= (lengths > DENSE) | (reached > _TWICE * limit)
         for some in largest_first(reached, over):
-            roundings = self._roundings(window, some + pieces.start, lengths[some] / 2, kind)
+            roundings = self._roundings(window, some + pieces.start, local[some], kind)
             certain = np.flatnonzero(reached[some] - limit > roundings)
             if certain.size:
                 at, rounding = int(some[certain[0]]), float(roundings[certain[0]])
