@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from recorded_rows import bare_robot, judged
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from trajcli.judge.intervals import Intervals, JoinedPairs, explained_by_law
 from trajcli.judge.motion import Requirements, judge_motion
@@ -245,3 +245,21 @@ def test_a_change_of_law_explains_nothing_between_rows_that_are_further_apart_th
     pieces = np.arange(lengths.size)
     explained = explained_by_law(window, pieces, np.zeros_like(pieces), 2, 2)
     assert np.isfinite(explained).tolist() == [True, True, False, False, False, True]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(("share", "verdict"), [(0.99, "exceeded"), (1.01, "satisfied")])
+def test_a_spline_through_many_rows_is_that_of_all_of_them(order: int, share: float, verdict: str) -> None:
+    """A joint gains speed over 300 rows and stops in the last interval: scipy knows the spline, and where it is worst."""
+    t = 0.5 * np.arange(300.0)
+    q = 0.01 * t**2 + 0.02 * np.sin(t)
+    spline = CubicSpline(t, q, bc_type="clamped")
+    times = np.linspace(t[0], t[-1], 299 * 64 + 1)
+    sizes = np.abs(spline(times, order))
+    assert times[sizes.argmax()] >= t[-3]
+    rows = RecordedMotion(
+        t, q[:, None], None, None, None, None, None, None, Resolution(0.0, *[np.zeros(1)] * 3), "rows"
+    )
+    bound = share * sizes.max() * np.array([[-1.0, 1.0]])
+    limits = replace(unlimited(1), **{("velocity", "acceleration")[order - 1]: bound})
+    assert judged(rows, limits, interpolate="jtc-upsampling").verdict == verdict

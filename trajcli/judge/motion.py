@@ -164,7 +164,7 @@ class MotionJudge:
             block = _one_block(self._waiting)
             self._begin(block)
         self._see(block)
-        if self._kept is not None:
+        if self._kept is not None and self._interpolation != "jtc-upsampling":  # a spline needs all rows
             self._judge(self._kept.t.size - 1 - BESIDE, ends=False)
 
     def _see(self, block: RecordedMotion) -> None:
