@@ -263,3 +263,43 @@ def test_a_spline_through_many_rows_is_that_of_all_of_them(order: int, share: fl
     bound = share * sizes.max() * np.array([[-1.0, 1.0]])
     limits = replace(unlimited(1), **{("velocity", "acceleration")[order - 1]: bound})
     assert judged(rows, limits, interpolate="jtc-upsampling").verdict == verdict
+
+
+@pytest.mark.parametrize("order", range(4))
+@pytest.mark.parametrize("seed", range(3))
+def test_the_error_of_a_spline_bounds_what_rounding_makes_of_it_beside_short_pieces(
+    seed: int, order: int
+) -> None:
+    """Two rows here and there stand a thousandth of the others apart: scipy knows the spline through the errors."""
+    rng = np.random.default_rng(seed)
+    lengths, e = np.where(rng.random(60) < 0.1, 1e-3, rng.uniform(0.5, 1.0, 60)), 1e-4
+    t, q = np.append(0.0, np.cumsum(lengths)), e * rng.choice([-1.0, 1.0], 61)
+    spline = CubicSpline(t, q, bc_type="clamped")
+    same = {
+        "lengths": lengths,
+        "late": np.zeros(60),
+        "rows": np.arange(61),
+        "moves": np.zeros(61, int),
+        "last": 60,
+    }
+    exact = Resolution(0.0, *[np.full(1, e)] * 3)
+    window = window_of(
+        0, t=t, states=(q[:, None], None, None), interpolation="jtc-upsampling", resolution=exact, **same
+    )
+    errors = window.piece_rows(np.arange(60), np.zeros(60, int), 1).error(order)
+    for piece, error in enumerate(errors.tolist()):
+        times = np.linspace(t[piece], t[piece + 1], 66)[1:-1]
+        assert np.abs(spline(times, order)).max() <= error * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_two_rows_close_together_make_nothing_certain_of_a_spline_beside_them(side: int) -> None:
+    """At 0.5 rad/s, rounded to 2 mrad; of two rows 1 ms apart that makes 2 rad/s."""
+    t = np.array([0.0, 1.0, 1.001, 2.001, 3.001])
+    q = side * (0.5 * t + 1e-3 * np.array([0.0, -1.0, 1.0, 0.0, 0.0]))
+    exact = Resolution(0.0, np.full(1, 1e-3), np.zeros(1), np.zeros(1))
+    rows = RecordedMotion(t, q[:, None], None, None, None, None, None, None, exact, "rows")
+    limits = replace(unlimited(1), velocity=np.array([[-0.7, 0.7]]))
+    assert judged(rows, limits, interpolate="jtc-upsampling").verdict == "within rounding"
+    fast = replace(unlimited(1), velocity=np.array([[-0.4, 0.4]]))
+    assert judged(rows, fast, interpolate="jtc-upsampling").verdict == "exceeded"

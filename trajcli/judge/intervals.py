@@ -122,7 +122,25 @@ class Intervals:
             ends.append(both)
             errors.append(stated_errors(both, absolute, share).max(axis=0))
         spline = self.interpolation == "jtc-upsampling"
-        return PieceRows(self.lengths[piece], self.late[piece], tuple(ends), tuple(errors), spline)
+        beside = self._rates_off[piece, joint] if spline else 0.0
+        return PieceRows(self.lengths[piece], self.late[piece], tuple(ends), tuple(errors), spline, beside)
+
+    @cached_property
+    def _rates_off(self) -> Array:
+        """By how much mean rates may be off, of pieces and, halved row by row, of those near, (N - 1, n).
+
+        The slopes of a spline follow from means of neighbours with weights that fall by half at least.
+        """
+        q, length = np.asarray(self.states[0]), self.lengths[:, None]
+        off = stated_errors(q, *self.resolution.roundings[0])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shortest = np.maximum(length - self.late[:, None], 0.0)
+            more = np.abs(np.diff(q, axis=0)) * (1.0 / shortest - 1.0 / length)
+            rates = np.nan_to_num(np.maximum(off[:-1], off[1:]) / shortest + more, nan=np.inf, posinf=np.inf)
+        for k in (1, 2, 4, 8, 16):
+            padded = np.pad(rates, ((k, k), (0, 0)))
+            rates = np.maximum(rates, 0.5**k * np.maximum(padded[2 * k :], padded[: -2 * k]))
+        return np.asarray(rates)
 
     def rows_by_level(self, pieces: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], PieceRows]]:
         """Yield which pieces determine equally many derivatives, and the rows of all their joints."""

@@ -40,6 +40,7 @@ class PieceRows:
         ends: Values of order 0, 1, 2 at both ends, as far as the pieces use them, each of shape (2, m).
         errors: By how much these may be off, one of shape (m,) for each.
         spline: Whether the pieces are of one spline through all positions, whatever else the rows state.
+        beside: What of the rounding of the mean rates of pieces near in the spline reaches these, shape (m,).
     """
 
     length: Array
@@ -47,6 +48,7 @@ class PieceRows:
     ends: tuple[Array, ...]
     errors: tuple[Array, ...]
     spline: bool = False
+    beside: Array | float = 0.0
 
     @property
     def shortest(self) -> Array:
@@ -89,7 +91,8 @@ class PieceRows:
     def _spline_error(self, order: int) -> Array:
         """Return by how much a spline through positions may be off: its neighbours' rounding counts, too."""
         change = self.ends[0][1] - self.ends[0][0]
-        return _SPLINE[order] * _defect(change, self.errors[0], self, order)
+        own = _defect(change, self.errors[0], self, order)
+        return _SPLINE[order] * np.maximum(own, self.beside * self.shortest ** (1.0 - order))
 
 
 def stated_errors(values: Array, absolute: Array, relative: float) -> Array:
