@@ -87,6 +87,30 @@ def test_what_nobody_limits_where_the_arm_stands_is_not_missing() -> None:
     assert ("j1", "jerk") in verify(whole, [limits()] * 5).unchecked
 
 
+def test_what_nobody_limits_of_a_joint_at_an_even_speed_is_missing() -> None:
+    """It moves all the way, though nothing accelerates it."""
+    even = PiecewisePolynomial(np.array([0.0, 1.0]), np.array([[[0.5]], [[1.0]]]))
+    moving = state([1.5], velocity=0.5)
+    whole = trajectory(constant([1.0], 1.0), even, end=moving)
+    bounded = limits(position=9.0, velocity=9.0, acceleration=9.0, jerk=99.0)
+    jerky = replace(bounded, jerk=limits().jerk)
+    assert verify(whole, [bounded, jerky]).unchecked == (("j1", "jerk"),)
+    assert verify(whole, [jerky, bounded]).unchecked == ()
+
+
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [(0, "verified"), (1, "1 finding"), (2, "2 findings"), (3, "3 findings"), (11, "11 findings")],
+)
+def test_a_verdict_says_how_much_it_found_and_shows_the_first_two(count: int, words: str) -> None:
+    whole = trajectory(between([0.0], [1.0], duration=1.0))
+    verdict = verify(whole, [limits(velocity=1.0)])
+    several = replace(verdict, findings=verdict.findings[:1] * count)
+    assert several.text == words
+    shown = ", ".join(["velocity of j1"] * min(count, 2) + ["..."] * (count > 2))
+    assert repr(several) == f"Verdict({words}{': ' * (count > 0)}{shown})"
+
+
 @pytest.mark.parametrize(("loaded", "unchecked"), [((), ()), ((1,), ()), ((2,), (("j1", "effort"),))])
 def test_efforts_are_left_unchecked_where_a_load_is_moved(loaded: tuple[int, ...], unchecked: Any) -> None:
     """The second of three moves takes no time, and so nothing is moved in it."""
