@@ -10,7 +10,7 @@ from trajcli.cli.outcome import print_text
 from trajcli.cli.polynomials import amount, blend_lines, knot_lines, polynomial_lines
 from trajcli.cli.progress import is_terminal, progress
 from trajcli.cli.tool_text import clean, point_text, pose_lines, tool_lines
-from trajcli.errors import InputError
+from trajcli.errors import InputError, at_least
 from trajcli.job.read import load_job
 from trajcli.output.delivery.delivered import plan_of
 from trajcli.output.explain import explanation
@@ -336,7 +336,7 @@ def _speed(move: ExplainedMove) -> Iterator[str]:
         yield f"  at its limits: {times}{more}"
     yield from _savings(move.savings)
     if move.stretch != 1:
-        yield f"  stretched {move.stretch:.6g} times"
+        yield f"  stretched {at_least(move.stretch)} times"
     if reference is None:
         return
     if reference.duration is None:

@@ -14,7 +14,7 @@ import numpy as np
 from trajcli.checks.verify import over_limits
 from trajcli.curves.operations import scale_time
 from trajcli.curves.piecewise import Array
-from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError
+from trajcli.errors import Amount, Amounts, PlanningError, Problem, TrajcliError, at_least
 from trajcli.findings import Finding
 from trajcli.kinematics.robot import Robot, ToolLimits
 from trajcli.limits.joints import JointSurvey, peaks_by_move
@@ -165,7 +165,7 @@ def long_enough(
     needed, why = planned.curve.duration, error.problems[0]
     if needed <= wanted:
         raise error
-    message = f"stretched {needed / wanted:.6g} times, from {{before}} to {{after}}: {why.message}"
+    message = f"stretched {at_least(needed / wanted)} times, from {{before}} to {{after}}: {why.message}"
     amounts: Amounts = {**why.amounts, "before": Amount(wanted), "after": Amount(needed)}
     event = Event("slowed", message, index, amounts)
     planned = replace(planned, events=(event, *planned.events))
@@ -215,7 +215,7 @@ def _stretched(
 ) -> PlannedMove:
     """Return the move that lasts `factor` times longer, with an event that names the worst finding."""
     slower = with_duration(move, move.duration * factor)
-    how = f"stretched {slower.duration / move.duration:.6g} times"
+    how = f"stretched {at_least(slower.duration / move.duration)} times"
     event = _event(kind, how, move, slower, over, remark)
     return replace(slower, planned=replace(slower.planned, events=(event, *slower.planned.events)))
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from trajcli.consumers.judgement import ProfileJudgement
 from trajcli.consumers.profile import Profile
-from trajcli.errors import TrajcliError, VerificationError
+from trajcli.errors import TrajcliError, VerificationError, at_least
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.grids import Grid, KnotGrid, UniformGrid
@@ -320,7 +320,7 @@ class _Search:
         longer = best.duration / first.duration
         if longer <= 1 + _LONGER:
             return _with_event(best, "for_consumer", f"{best.where}: its breaks fall on rows")
-        text = f"{best.where}: stretched {longer:.6g} times so that its rows, joined, keep all limits"
+        text = f"{best.where}: stretched {at_least(longer)} times so that its rows, joined, keep all limits"
         return _with_event(best, "slowed", text)
 
     def _with_stops(self) -> ForConsumer | None:
