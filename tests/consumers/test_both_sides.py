@@ -293,7 +293,7 @@ def test_the_coarsest_joint_is_named(joint: int) -> None:
     found = judged(coarse, "franka-fr3", Surroundings(coarse.joints, STILL[0])).findings
     (told,) = [each for each in found if each.rule == "fr3-decimals"]
     assert told.joint == f"joint_{joint + 1}"
-    assert "positions are rounded to 1e-06," in told.message
+    assert "positions are rounded to 1e-06 rad, which" in told.message
 
 
 @pytest.mark.parametrize("profile", profile_names())

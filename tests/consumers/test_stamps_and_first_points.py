@@ -169,7 +169,8 @@ def test_of_limits_on_the_curve_to_the_first_point_the_one_that_is_passed_furthe
     assert found is not None
     assert (found.kind, found.joint, abs(found.value)) == (worse, "joint_3", pytest.approx(size[worse]))
     side = np.sign(found.value)
-    assert f"reaches {side * size[worse]:.6g} at t = " in found.message
+    unit = {"velocity": "rad/s", "acceleration": "rad/s^2"}[worse]
+    assert f"reaches {side * size[worse]:.6g} {unit} at t = " in found.message
     assert found.message.endswith(f"its limit is {side * bound[worse]:.6g}")
 
 

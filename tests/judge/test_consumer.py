@@ -49,6 +49,21 @@ def test_a_breach_is_a_finding() -> None:
     )
 
 
+def test_of_a_slide_a_breach_is_in_metres() -> None:
+    robot = load_robot("fr3")
+    slide = replace(robot.joints[3], type="prismatic")
+    judge = ConsumerJudge("franka-fr3", replace(robot, joints=(*robot.joints[:3], slide, *robot.joints[4:])))
+    q = at_rest(100).q.copy()
+    q[50:, 3:5] -= 0.006
+    judge.take(replace(at_rest(100), q=q))
+    units = {
+        found.joint: found.message.split(" is ")[1].split()[1]
+        for found in judge.result()[0]
+        if found.rule == "fr3-velocity"
+    }
+    assert units == {"fr3_joint4": "m/s", "fr3_joint5": "rad/s"}
+
+
 def test_rest_breaks_no_rule() -> None:
     judge = ConsumerJudge("franka-fr3", load_robot("fr3"), at_rest(1).q[0])
     for first in range(1, 501, 100):

@@ -24,7 +24,6 @@ from trajcli.streams.recorded_motion import RecordedMotion, Resolution
 __all__ = ["Differences", "EffortRate", "RoundingNoise", "VelocityTowardsEnds"]
 
 _ORDERS = {"velocity": 1, "acceleration": 2, "jerk": 3}
-_UNIT = ("", "/s", "/s^2", "/s^3")
 _NEAR = 0.01  # relative: rows that are not as far apart as that are not at the controller's period
 _ROUNDING = 1e-9  # relative
 
@@ -122,10 +121,9 @@ class Differences(_AtPeriod):
             compared = values[index + self._depth - order : index + self._depth + 1]
             noise = rounding_noise(order, largest_rounding(compared, rows.resolution), period)
             rounded = abs(value) - noise[joint] <= bound
-            unit = _UNIT[order]
             text = (
-                f"the {name} of {self.joint_name(rows, joint)} is {value:.6g} rad{unit} {when(rows, index)}, "
-                f"as a difference over {period:g} s; the limit is {bound:.9g}"
+                f"the {name} of {self.joint_name(rows, joint)} is {value:.6g} {self.unit(joint, order)} "
+                f"{when(rows, index)}, as a difference over {period:g} s; the limit is {bound:.9g}"
             )
             if rounded:
                 text += f", and the decimals of the file alone make up to {noise[joint]:.4g}"
@@ -189,9 +187,9 @@ class VelocityTowardsEnds(_AtPeriod):
                 "limit": float(np.copysign(allowed, value)),
                 "factor": abs(value) / allowed if allowed else None,
                 "method": "differences",
-                "message": f"the velocity of {self.joint_name(rows, joint)} is {value:.6g} rad/s "
-                f"{when(rows, index)}, {distance:.6g} rad before the end of its range, where "
-                f"{allowed:.6g} is allowed",
+                "message": f"the velocity of {self.joint_name(rows, joint)} is {value:.6g} "
+                f"{self.unit(joint, 1)} {when(rows, index)}, {distance:.6g} {self.unit(joint)} before the "
+                f"end of its range, where {allowed:.6g} is allowed",
                 "hint": "slow it down towards the end of the range, or stay further away from it",
             }
 
@@ -221,10 +219,11 @@ class RoundingNoise(RuleCheck):
             "kind": "quantisation",
             "value": float(noise[joint]),
             "limit": float(self.number("share") * limit[joint]),
-            "message": f"positions are rounded to {2 * float(half[joint]):.3g}, which makes a jerk of up to "
-            f"{float(noise[joint]):.4g} rad/s^3 as a difference over {self.number('period'):g} s, of "
-            f"{float(limit[joint]):.6g} that {self.joint_name(rows, joint)} may have",
-            "hint": "write positions in rad with at least nine decimals",
+            "message": f"positions are rounded to {2 * float(half[joint]):.3g} {self.unit(joint)}, which "
+            f"makes a jerk of up to {float(noise[joint]):.4g} {self.unit(joint, 3)} as a difference over "
+            f"{self.number('period'):g} s, of {float(limit[joint]):.6g} that {self.joint_name(rows, joint)} "
+            "may have",
+            "hint": f"write positions in {self.unit(joint)} with at least nine decimals",
         }
         # of numbers of few bits the largest is the coarsest
         roughest = int(np.abs(rows.q[:, joint]).argmax()) if rows.resolution.relative[0] else 0
@@ -256,8 +255,8 @@ class EffortRate(_AtPeriod):
                 "value": value,
                 "limit": float(np.copysign(limit[joint], value)),
                 "method": "differences",
-                "message": f"the effort of {self.joint_name(rows, joint)} changes by {value:.6g} N m/s "
-                f"{when(rows, index)}, and {limit[joint]:.6g} is recommended",
+                "message": f"the effort of {self.joint_name(rows, joint)} changes by {value:.6g} "
+                f"{self.effort_unit(joint)}/s {when(rows, index)}, and {limit[joint]:.6g} is recommended",
             }
 
         share = np.abs(rates) / limit

@@ -75,7 +75,7 @@ class VelocitySteps(RuleCheck):
                 "value": step,
                 "limit": 0.0,
                 "message": f"the velocity of {self.joint_name(rows, joint)} steps by {step:.6g} "
-                f"{when(rows, index)}, as straight lines are run from point to point",
+                f"{self.unit(joint, 1)} {when(rows, index)}, as straight lines are run from point to point",
                 "hint": "give velocities, and accelerations where there are any, in every point",
             }
 
@@ -89,18 +89,20 @@ class IntegerRange(RuleCheck):
 
     def _take(self, rows: RecordedMotion) -> None:
         limit = self.number("unit") * self.number("largest")
-        for name, values in (("position", rows.q), ("velocity", rows.qd), ("acceleration", rows.qdd)):
+        for order, name in enumerate(("position", "velocity", "acceleration")):
+            values = (rows.q, rows.qd, rows.qdd)[order]
             if values is None:
                 continue
 
-            def fields(index: int, joint: int, name: str = name, values: Array = values) -> dict[str, Any]:
-                value = float(values[index, joint])
+            def fields(index: int, joint: int, order: int = order, values: Array = values) -> dict[str, Any]:
+                value, name = float(values[index, joint]), QUANTITIES[order]
                 return {
                     "kind": name,
                     "value": value,
                     "limit": float(np.copysign(limit, value)),
                     "message": f"the {name} of {self.joint_name(rows, joint)}, {value:.6g} "
-                    f"{when(rows, index)}, is beyond {limit:.9g}, the largest number that can be sent",
+                    f"{self.unit(joint, order)} {when(rows, index)}, is beyond {limit:.9g}, the largest "
+                    "number that can be sent",
                 }
 
             self.note_rows(rows, np.abs(values) > limit, np.abs(values), fields)
@@ -142,7 +144,7 @@ class QuantisedCurve(RuleCheck):
                 "limit": tolerance,
                 "message": f"in whole units of {unit:g} and {time_unit:g} s the point {when(rows, index)} "
                 f"comes {apart}, and {self.joint_name(rows, joint)} is "
-                f"{float(off[index, joint]):.3g} off",
+                f"{float(off[index, joint]):.3g} {self.unit(joint)} off",
                 "hint": f"put points at whole multiples of {time_unit:g} s",
             }
 
@@ -187,7 +189,7 @@ class RoundedSegments(RuleCheck):
                 "limit": self.number("share") * float(bound[joint]),
                 "message": f"the segment that ends {when(rows, index)} lasts {float(steps[index, 0]):.6g} s: "
                 f"in whole units of {unit:g} that makes an acceleration of {self.joint_name(rows, joint)} "
-                f"of up to {value:.4g}, its limit is {float(bound[joint]):.6g}",
+                f"of up to {value:.4g} {self.unit(joint, 2)}, its limit is {float(bound[joint]):.6g}",
                 "hint": "put points further apart, as those of a rate are",
             }
 

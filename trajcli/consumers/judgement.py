@@ -9,7 +9,7 @@ from typing import Any
 from trajcli.consumers.differences import Differences, EffortRate, RoundingNoise, VelocityTowardsEnds
 from trajcli.consumers.executed import IntegerRange, QuantisedCurve, RoundedSegments, VelocitySteps
 from trajcli.consumers.profile import Profile, profile_names, read_profile
-from trajcli.consumers.rule_check import RuleCheck, Surroundings
+from trajcli.consumers.rule_check import RuleCheck, Surroundings, surroundings_of
 from trajcli.consumers.stamps import (
     ControllerPeriod,
     FirstPoint,
@@ -143,7 +143,7 @@ class ConsumerJudge:
         profile: Its rules; `profile.interpolation` says how the consumer runs from row to row.
     """
 
-    def __init__(self, profile: str, robot: Robot | None = None, start: Array | None = None) -> None:
+    def __init__(self, profile: str, robot: Robot, start: Array | None = None) -> None:
         """Take a profile by its name.
 
         Args:
@@ -155,8 +155,7 @@ class ConsumerJudge:
             InputError: When there is no such profile.
         """
         self.profile: Profile = load_profile(profile)
-        of_robot = (None, None) if robot is None else (robot.joint_names, robot.limits)
-        self._checks = checks_of(self.profile, Surroundings(of_robot[0], start, of_robot[1]))
+        self._checks = checks_of(self.profile, surroundings_of(robot, start))
 
     def take(self, rows: RecordedMotion) -> None:
         """Judge the next rows."""

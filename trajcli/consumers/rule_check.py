@@ -13,8 +13,9 @@ from trajcli.consumers.profile import ConsumerRule
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Collector, Finding, FindingSeverity, at_time
 from trajcli.frozen import frozen
-from trajcli.kinematics.robot import Limits
+from trajcli.kinematics.robot import JointType, Limits, Robot
 from trajcli.streams.recorded_motion import RecordedMotion
+from trajcli.units import effort_unit, joint_units
 
 _SAME = 1e-9  # relative: of rows that break a rule alike the first is named
 
@@ -27,11 +28,18 @@ class Surroundings:
         joints: Names of the robot's joints, in its order; None where there is no robot.
         start: Positions in which the arm stands when the motion begins, shape (n,); None where unknown.
         limits: Of the robot; None where unknown.
+        types: Of its joints; None where all of them turn.
     """
 
     joints: tuple[str, ...] | None = None
     start: Array | None = None
     limits: Limits | None = None
+    types: tuple[JointType, ...] | None = None
+
+
+def surroundings_of(robot: Robot, start: Array | None) -> Surroundings:
+    """Return what is known of a robot, and of where it stands when the motion begins, (n,)."""
+    return Surroundings(robot.joint_names, start, robot.limits, robot.joint_types)
 
 
 class RuleCheck(ABC):
@@ -101,6 +109,18 @@ class RuleCheck(ABC):
             return None
         names = rows.joints or self.around.joints
         return names[joint] if names and len(names) == rows.q.shape[1] else f"q{joint + 1}"
+
+    def unit(self, joint: int, order: int = 0) -> str:
+        """Return the SI unit of the position of a joint, or of its derivative of an order."""
+        return joint_units([self._type(joint)], order)[0]
+
+    def effort_unit(self, joint: int) -> str:
+        """Return the unit of what drives a joint."""
+        return effort_unit(self._type(joint))
+
+    def _type(self, joint: int) -> JointType:
+        types = self.around.types or ()
+        return types[joint] if joint < len(types) else "revolute"
 
     def note(
         self,

@@ -13,6 +13,7 @@ from trajcli.consumers.differences import largest_rounding
 from trajcli.consumers.rule_check import OfFirstRow, RuleCheck, when
 from trajcli.curves.piecewise import Array
 from trajcli.findings import Finding
+from trajcli.kinematics.robot import QUANTITIES
 from trajcli.streams.recorded_motion import RecordedMotion
 
 __all__ = ["ControllerPeriod", "FirstPoint", "IncreasingTimes", "LongestTime", "SegmentDurations"]
@@ -193,8 +194,8 @@ class FirstPoint(OfFirstRow):
                 "kind": "start",
                 "value": float(apart[joint]),
                 "limit": float(tolerance[joint]),
-                "message": f"the first point, {when(rows, index)}, is {abs(float(apart[joint])):.6g} from "
-                f"where {self.joint_name(rows, joint)} stands",
+                "message": f"the first point, {when(rows, index)}, is {abs(float(apart[joint])):.6g} "
+                f"{self.unit(joint)} from where {self.joint_name(rows, joint)} stands",
                 "hint": "let the motion begin where the arm stands, or give its first point a later time",
             }
 
@@ -212,8 +213,8 @@ class FirstPoint(OfFirstRow):
                 "value": value,
                 "limit": limit,
                 "message": f"on the curve from where the arm stands to the first point, {when(rows, 0)}, the "
-                f"{kind} of {self.joint_name(rows, joint)} reaches {value:.6g} at t = {time:.6g} s, "
-                f"its limit is {limit:.6g}",
+                f"{kind} of {self.joint_name(rows, joint)} reaches {value:.6g} "
+                f"{self.unit(joint, QUANTITIES.index(kind))} at t = {time:.6g} s, its limit is {limit:.6g}",
                 "hint": "give the first point a later time, or let the motion begin where the arm stands",
             }
             self.note(rows, joint, 0, abs(value / limit) if limit else np.inf, fields)

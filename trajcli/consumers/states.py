@@ -108,8 +108,8 @@ class LastVelocity(RuleCheck):
                 "kind": "end",
                 "value": value,
                 "limit": limit,
-                "message": f"the last velocity of {self.joint_name(rows, joint)} is {value:.6g}, "
-                f"{when(rows, index)}; at most {limit:.3g} is accepted",
+                "message": f"the last velocity of {self.joint_name(rows, joint)} is {value:.6g} "
+                f"{self.unit(joint, 1)}, {when(rows, index)}; at most {limit:.3g} is accepted",
                 "hint": "end at rest, with a last velocity of exactly 0.0",
             }
 
@@ -158,7 +158,7 @@ class EffortRange(RuleCheck):
                 "value": value,
                 "limit": float(np.copysign(limit[joint], value)),
                 "message": f"the effort of {self.joint_name(rows, joint)} is {value:.6g} "
-                f"{when(rows, index)}, and {limit[joint]:.6g} is recommended",
+                f"{self.effort_unit(joint)} {when(rows, index)}, and {limit[joint]:.6g} is recommended",
             }
 
         self.note_rows(rows, share > 1 + _ROUNDING, share, fields)
@@ -183,8 +183,8 @@ class PositionRange(RuleCheck):
                 "kind": "position",
                 "value": value,
                 "limit": limit,
-                "message": f"the position of {self.joint_name(rows, joint)} is {value:.9g} rad "
-                f"{when(rows, index)}, its range ends at {limit:.9g}",
+                "message": f"the position of {self.joint_name(rows, joint)} is {value:.9g} "
+                f"{self.unit(joint)} {when(rows, index)}, its range ends at {limit:.9g}",
             }
 
         self.note_rows(rows, beyond >= 0, beyond, fields)
@@ -245,7 +245,7 @@ class AtRest(RuleCheck):
                     "method": method,
                     "message": f"at its {self.word('at')}, {when(rows, index)}, "
                     f"{self.joint_name(rows, joint)} has the {kind} {float(values[joint]):.6g} "
-                    f"rad/s{'^2' * (order == 2)}, and is not at rest",
+                    f"{self.unit(joint, order)}, and is not at rest",
                 }
 
             self.note_row(rows, index, np.abs(values) > allowed, size, fields)

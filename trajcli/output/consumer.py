@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from trajcli.consumers.judgement import ProfileJudgement, judge_by_profile, load_profile
 from trajcli.consumers.profile import Profile
-from trajcli.consumers.rule_check import Surroundings
+from trajcli.consumers.rule_check import surroundings_of
 from trajcli.errors import InputError, Problem, VerificationError
 from trajcli.findings import Finding
 from trajcli.grids import Grid
@@ -107,7 +107,7 @@ def judge_as_written(
     from trajcli.streams.recorded_motion import open_motion
 
     robot = plan.loaded.robot
-    around = Surroundings(robot.joint_names, plan.moves[0].start.position, robot.limits)
+    around = surroundings_of(robot, plan.moves[0].start.position)
     with TemporaryDirectory(prefix="trajcli-") as folder:
         path = str(Path(folder) / f"rows{_ending(form)}")
         write_rows(plan, grid, path, digits, form=form, log=log)
