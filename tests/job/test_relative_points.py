@@ -140,6 +140,28 @@ def test_wrong_points_are_said_where_they_stand(text: str, place: str, message: 
     assert any(where.endswith(f":{place}") and message in what for where, what in problems), problems
 
 
+@pytest.mark.parametrize(
+    ("beside", "advice", "followed"),
+    [
+        ("xyz: [0, 0, 1]", "offset: {xyz: ...}", ["from: a, offset: {xyz: [0, 0, 1]}"]),
+        ("rotvec: [0, 0, 1]", "offset: {rotvec: ...}", ["from: a, offset: {rotvec: [0, 0, 1]}"]),
+        ("in: world", "along whose axes: `frame`", ["from: a, frame: world"]),
+        ("joints: 0", "leave one of them out", ["from: a", "joints: 0"]),
+        ("yaw: 3", "leave one of them out", ["from: a", "yaw: 3"]),
+        ("direction: x", "leave one of them out", ["from: a", "direction: x"]),
+    ],
+)
+def test_advice_about_what_cannot_stand_beside_from_works(beside: str, advice: str, followed: list[str]) -> None:
+    point = "  a: {xyz: [1, 2, 3], rpy: [0, 0, 0]}\n"
+    with pytest.raises(InputError) as caught:
+        points_of(f"{point}  b: {{from: a, {beside}}}\n")
+    (problem,) = caught.value.problems
+    assert problem.message == f"from and {beside.partition(':')[0]} exclude each other"
+    assert (problem.hint or "").endswith(advice)
+    for state in followed:
+        assert "b" in points_of(f"{point}  b: {{{state}}}\n")
+
+
 @pytest.mark.parametrize("flawed", ["  a: {xyz: [1, 2]}\n", "  a: {from: z}\n", "  a: z\n", "  a: 3\n"])
 def test_a_flaw_of_a_point_is_not_said_again_by_those_relative_to_it(flawed: str) -> None:
     with pytest.raises(InputError) as caught:

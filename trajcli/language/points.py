@@ -23,7 +23,7 @@ from trajcli.language.numbers import (
     shown,
     written_number,
 )
-from trajcli.language.poses import Pose, moved
+from trajcli.language.poses import ROTATIONS, Pose, moved
 from trajcli.language.targets import RELATIVE, PoseFields, Relative, Target
 from trajcli.units import Quantity
 
@@ -292,9 +292,9 @@ def _moved(value: Mapping[str, Any], name: str, point: _Fields | None, context: 
         every = key == "joints" and not isinstance(value[key], Mapping)
         if (key in PoseFields.model_fields and key not in BESIDE) or every or key == "in":
             text = f"from and {key} exclude each other"
-            hint = f"say how far from the point: offset: {{{key}: ...}}"
-            if key == "in":
-                hint = "say along whose axes: `frame`"
+            hint = "say along whose axes: `frame`" if key == "in" else "leave one of them out"
+            if key in ("xyz", *ROTATIONS):
+                hint = f"say how far from the point: offset: {{{key}: ...}}"
             raise FlawError(text, key, AT_KEY, hint=hint)
         if key not in (*RELATIVE_FIELDS, *BESIDE):
             from trajcli.suggest import did_you_mean, valid_names
