@@ -56,6 +56,7 @@ def test_rows_are_at_1000_hz_with_three_derivatives_unless_said_otherwise() -> N
         ("{times: [0, 1], align: true}", "align needs a rate", "true"),
         ("{times: [0, 1, 1]}", "times must increase, but 1 s comes after 1 s", "1"),
         ("{times: [0, 1, 2, 3, 2.5]}", "but 2.5 s comes after 3 s", "2.5"),
+        ("{times: [0, 12.34567891, 12.3456789]}", "12.3456789 s comes after 12.34567891 s", "12.3456789"),
         ("{columns: [t, q, qd, q]}", "the columns 'q' stand twice", "q"),
         ("{columns: [q, t, q]}", "the columns 'q' stand twice", "q"),
         ("{columns: [t, signals]}", "no move of the job sets a signal", "signals"),
@@ -69,6 +70,14 @@ def test_outputs_that_contradict_themselves_are_refused(output: str, said: str, 
     assert (line, text) == (4, place)
 
 
+def test_columns_that_stand_twice_are_told_at_the_second_one() -> None:
+    with pytest.raises(InputError) as caught:
+        job(more="output: {columns: [t, q, qd, q]}")
+    place = caught.value.problems[0].place
+    assert place is not None
+    assert place.column == 1 + len("output: {columns: [t, q, qd, ")
+
+
 def test_rows_stand_in_any_frame_of_the_job() -> None:
     for frame in ("world", "base", "table"):
         more = f"output: {{in: {frame}}}\nframes: {{table: {{xyz: [1, 0, 0]}}}}"
@@ -76,6 +85,9 @@ def test_rows_stand_in_any_frame_of_the_job() -> None:
     with pytest.raises(InputError, match="no frame 'tabel'") as caught:
         job(more="output: {in: tabel}\nframes: {table: {xyz: [1, 0, 0]}}", robot="ur5e")
     assert caught.value.problems[0].hint == "did you mean 'table'?"
+    with pytest.raises(InputError, match="no frame 'xyz'") as caught:
+        job(more="output: {in: xyz}\nframes: {table: {xyz: [1, 0, 0]}}", robot="ur5e")
+    assert all(name in (caught.value.problems[0].hint or "") for name in ("table", "world", "base"))
 
 
 def test_a_start_is_a_state_and_may_be_the_first_row_of_a_recording(tmp_path: Path) -> None:
@@ -105,12 +117,17 @@ QUINTIC = "{planner: quintic, to: {joints: 1}, duration: 1}"
 
 def test_a_move_of_continuity_1_starts_with_no_acceleration() -> None:
     moving = "{joints: 0, acceleration: [0, 2]}"
-    assert refused("cubic cannot start with an acceleration", CUBIC, start=moving)[0] == 3
-    job(QUINTIC, start=moving)
+    assert refused("cubic cannot start with an acceleration", CUBIC, start=moving) == (3, moving)
+    with pytest.raises(InputError) as caught:
+        job(CUBIC, start=moving)
+    assert caught.value.problems[0].hint == "use quintic or jerk_limited for the first move, or leave it out"
+    for other in (QUINTIC, "{planner: jerk_limited, to: {joints: 1}}"):
+        assert job(other, start=moving).job.start.acceleration == (0, 2)
     job(CUBIC, start="{joints: 0, acceleration: 0}")
     between = "{attach: {mass: 1}}, "
     refused("cubic cannot start", between + CUBIC, robot="ur5e", start="{joints: 0, acceleration: 1}")
-    refused("nothing moves", "{attach: {mass: 1}}, {detach: {}}", robot="ur5e")
+    nothing = "{attach: {mass: 1}}, {detach: {}}"
+    assert refused("nothing moves", nothing, robot="ur5e") == (5, f"[{nothing}]")
 
 
 @pytest.mark.parametrize(
@@ -137,6 +154,10 @@ def test_a_name_is_of_a_point_or_of_a_frame() -> None:
     names = "points: {a: {joints: 0}, b: {joints: 1}, c: {joints: 1}}\nframes: {b: {xyz: [1, 0, 0]}, c: {xyz: [0, 0, 0]}}"
     with pytest.raises(InputError) as caught:
         job(more=names, robot="ur5e")
+    places = [problem.place for problem in caught.value.problems if problem.place]
+    assert [(p.line, p.column, p.length) for p in places] == [
+        (4, 1 + names.index(f"{name}: {{joints: 1"), 1) for name in "bc"
+    ]
     assert [problem.text() for problem in caught.value.problems] == [
         "'b' is a point and a frame",
         "'c' is a point and a frame",
@@ -182,11 +203,15 @@ def test_a_move_that_is_repeated_is_read_once_and_each_stays_at_its_place(flaw: 
 
 def test_defaults_without_a_shape_are_time_optimal() -> None:
     read = "points: {a: {joints: [0, -1.5, 1.5, 0, 1.5, 0]}}\n"
-    for law, shape in (("{speed: 0.1}", "time_optimal"), ("{shape: cubic, speed: 0.1}", "cubic")):
+    for law, shape, speed in (
+        ("{speed: 0.1}", "time_optimal", 0.1),
+        ("{shape: cubic, speed: 0.1}", "cubic", 0.1),
+        ("{acceleration: 2}", "time_optimal", None),
+    ):
         loaded = job(LINE, f"{read}defaults: {{law: {law}}}", robot="ur5e", start="a")
         assert loaded.job.moves[0].law.shape == shape
         assert loaded.job.defaults.law.shape == shape
-        assert loaded.job.defaults.law.speed == 0.1
+        assert loaded.job.defaults.law.speed == speed
 
 
 def test_zones_signals_and_tools_are_found_in_any_move() -> None:
@@ -216,6 +241,16 @@ def test_zones_signals_and_tools_are_found_in_any_move() -> None:
         f"{to}, at: {{signal: a, value: 1}}}}, {HOLD}", "output: {columns: [t, signals]}", "ur5e", start
     ).job
     assert at.has_signals
+    last = f"{HOLD}, {{signal: a, value: 1}}"
+    assert job(last, "output: {columns: [t, signals]}").job.has_signals
+
+
+def test_the_advice_about_columns_of_signals_that_none_sets_works() -> None:
+    columns = "output: {columns: [t, signals]}"
+    with pytest.raises(InputError) as caught:
+        job(QUINTIC, columns)
+    advised = (caught.value.problems[0].hint or "").split("`")[1]
+    assert job(f"{QUINTIC[:-1]}, {advised}}}", columns).job.has_signals
 
 
 def test_a_word_for_what_is_over_its_limit_is_one_of_two() -> None:

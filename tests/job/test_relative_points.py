@@ -151,7 +151,9 @@ def test_wrong_points_are_said_where_they_stand(text: str, place: str, message: 
         ("direction: x", "leave one of them out", ["from: a", "direction: x"]),
     ],
 )
-def test_advice_about_what_cannot_stand_beside_from_works(beside: str, advice: str, followed: list[str]) -> None:
+def test_advice_about_what_cannot_stand_beside_from_works(
+    beside: str, advice: str, followed: list[str]
+) -> None:
     point = "  a: {xyz: [1, 2, 3], rpy: [0, 0, 0]}\n"
     with pytest.raises(InputError) as caught:
         points_of(f"{point}  b: {{from: a, {beside}}}\n")
