@@ -164,11 +164,71 @@ def test_advice_about_what_cannot_stand_beside_from_works(
         assert "b" in points_of(f"{point}  b: {{{state}}}\n")
 
 
-@pytest.mark.parametrize("flawed", ["  a: {xyz: [1, 2]}\n", "  a: {from: z}\n", "  a: z\n", "  a: 3\n"])
+@pytest.mark.parametrize(
+    "flawed",
+    [
+        "  a: {xyz: [1, 2]}\n",
+        "  a: {from: z}\n",
+        "  a: z\n",
+        "  a: 3\n",
+        "  a: {in: z, xyz: [1, 2, 3]}\n",
+        "  a: {from: here, ofset: {}}\n",
+        "  j: {joints: 0}\n  a: {from: j, frame: z}\n",
+        "  p: {xyz: [1, 2, 3]}\n  a: {from: p}\n",
+    ],
+)
 def test_a_flaw_of_a_point_is_not_said_again_by_those_relative_to_it(flawed: str) -> None:
     with pytest.raises(InputError) as caught:
         points_of(f"{flawed}  b: {{from: a}}\n  c: {{from: b}}\n")
     assert len(caught.value.problems) == 1
+
+
+def test_names_that_lead_into_a_circle_are_told_with_the_circle() -> None:
+    with pytest.raises(InputError) as caught:
+        points_of("  a: {from: b}\n  b: c\n  c: d\n  d: c\n")
+    assert [(str(problem.place)[6:], problem.message) for problem in caught.value.problems] == [
+        (":6:13", "the point 'c' is named by itself (b -> c -> d -> c)"),
+        (":7:6", "the point 'c' is named by itself (c -> d -> c)"),
+        (":8:6", "the point 'd' is named by itself (d -> c -> d)"),
+        (":9:6", "the point 'c' is named by itself (c -> d -> c)"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("points", "hint"),
+    [
+        ("points: {pick: {joints: 0}, place: {joints: 0}}\n", "did you mean 'place'?"),
+        ("points: {a1: {joints: 0}, b2: {joints: 0}}\n", "points: a1, b2"),
+        ("", "the job has no `points`"),
+    ],
+)
+def test_a_name_of_no_point_is_told_with_those_that_there_are(points: str, hint: str) -> None:
+    with pytest.raises(InputError) as caught:
+        job_from_text(f"{HEAD}{points}{MOVES.replace('{joints: [10, -90, 90, 0, 90, 0]}', 'plaice')}")
+    (problem,) = caught.value.problems
+    assert (problem.message, problem.hint) == ("there is no point 'plaice'", hint)
+
+
+def test_a_value_that_is_no_state_is_told_with_what_is_one() -> None:
+    with pytest.raises(InputError) as caught:
+        points_of("  a: 3\n")
+    assert caught.value.problems[0].hint == "write {joints: ...}, or the name of a point"
+    points_of("  a: {joints: 3}\n  b: a\n")
+
+
+@pytest.mark.parametrize("count", [100, 101])
+def test_a_chain_of_a_hundred_points_is_read_and_one_more_is_refused(count: int) -> None:
+    step = "offset: {xyz: [0, 0, 1]}"
+    links = "".join(f"  p{k}: {{from: p{k + 1}, {step}}}\n" for k in range(count))
+    text = f"{links}  p{count}: {{xyz: [1, 2, 3], rpy: [0, 0, 0]}}\n"
+    if count == 100:
+        np.testing.assert_allclose(
+            points_of(text)["p0"].full_pose()[:3, 3], [0.001, 0.002, 0.103], atol=1e-13
+        )
+        return
+    with pytest.raises(InputError, match="more than 100 points") as caught:
+        points_of(text)
+    assert [str(problem.place)[6:] for problem in caught.value.problems] == [":6:14"]
 
 
 @pytest.mark.full
