@@ -216,6 +216,54 @@ def test_a_value_that_is_no_state_is_told_with_what_is_one() -> None:
     points_of("  a: {joints: 3}\n  b: a\n")
 
 
+@pytest.mark.parametrize(
+    ("point", "relative", "message", "hint"),
+    [
+        ("{joints: 0}", "ofset: {}", "unknown key 'ofset'", "did you mean 'offset'?"),
+        (
+            "{joints: 0}",
+            "qq: 3",
+            "unknown key 'qq'",
+            "valid names: from, offset, frame, configuration, velocity, acceleration, joints",
+        ),
+        (
+            "{velocity: 0}",
+            "offset: {}",
+            "the point 'a' is given without a pose",
+            "give it as a pose, or by its joints",
+        ),
+        (
+            "{xyz: [1, 2, 3]}",
+            "offset: {xyz: [0, 0, 1]}",
+            "the frame of the tool is not known there",
+            "give 'a' an orientation, or say `frame: world`",
+        ),
+        (
+            "{xyz: [1, 2, 3]}",
+            "frame: world, offset: {rpy: [0, 0, 9]}",
+            "the offset cannot turn it",
+            "give 'a' an orientation",
+        ),
+    ],
+)
+def test_what_a_relative_point_lacks_is_told_with_what_helps(
+    point: str, relative: str, message: str, hint: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        points_of(f"  a: {point}\n  b: {{from: a, {relative}}}\n")
+    (problem,) = caught.value.problems
+    assert message in problem.message
+    assert problem.hint == hint
+
+
+def test_advice_about_a_point_without_an_orientation_works() -> None:
+    step = "offset: {xyz: [0, 0, 1]}"
+    above = points_of(f"  a: {{xyz: [1, 2, 3]}}\n  b: {{from: a, {step}, frame: world}}\n")["b"]
+    assert above.xyz == pytest.approx((0.001, 0.002, 0.004))
+    whole = points_of(f"  a: {{xyz: [1, 2, 3], rpy: [180, 0, 0]}}\n  b: {{from: a, {step}}}\n")["b"]
+    assert whole.xyz == pytest.approx((0.001, 0.002, 0.002))
+
+
 @pytest.mark.parametrize("count", [100, 101])
 def test_a_chain_of_a_hundred_points_is_read_and_one_more_is_refused(count: int) -> None:
     step = "offset: {xyz: [0, 0, 1]}"
