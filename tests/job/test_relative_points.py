@@ -42,6 +42,20 @@ def test_an_offset_in_the_frame_of_the_tool_is_a_product() -> None:
     assert point.configuration.elbow == "up"
 
 
+def test_the_smallest_turn_of_an_offset_counts() -> None:
+    point = points_of(f"{PICK_TEXT}  p: {{from: pick, offset: {{rotvec: [0, 0, 0.001]}}}}\n")["p"]
+    turned = np.linalg.inv(PICK) @ point.full_pose()
+    assert np.degrees(Rotation.from_matrix(turned[:3, :3]).as_rotvec()) == pytest.approx(
+        [0, 0, 0.001], abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("target", ["{joints_by: 3}", "{from: here}", "{joints: 3}"])
+def test_a_job_waits_for_the_plan_where_a_target_is_relative_to_where_the_arm_stands(target: str) -> None:
+    moves = MOVES.replace("{joints: [10, -90, 90, 0, 90, 0]}", target)
+    assert job_from_text(HEAD + moves).waits == ("by" in target or "here" in target)
+
+
 def test_an_offset_in_world_moves_and_turns_about_the_axes_of_world() -> None:
     point = points_of(f"{PICK_TEXT}  p: {{from: pick, offset: {OFFSET_TEXT}, frame: world}}\n")["p"]
     np.testing.assert_allclose(point.full_pose()[:3, 3], PICK[:3, 3] + OFFSET[:3, 3], atol=1e-15)

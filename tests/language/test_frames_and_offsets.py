@@ -142,13 +142,14 @@ def test_what_stands_beside_from_is_kept_or_counts_more() -> None:
         "  a: {xyz: [1, 2, 3], rpy: [0, 0, 5], joints: {wrist_3_joint: 30}, velocity: 7, acceleration: 8}\n"
         "  b: {from: a, offset: {xyz: [0, 0, 1]}}\n"
         "  c: {from: b, joints: {elbow_joint: 10, wrist_3_joint: 20}, velocity: {wrist_1_joint: 9}, acceleration: 3}\n"
-        "  d: {xyz: [1, 2, 3], direction: [0, 3, 4], tool_axis: y}\n"
+        "  s: {from: c, velocity: 3}\n  d: {xyz: [1, 2, 3], direction: [0, 3, 4], tool_axis: y}\n"
         "  e: {from: d, offset: {xyz: [0, 0, 1]}, frame: tray}\n"
     ).job.points
     degrees = {name: {k: np.degrees(v) for k, v in (point.pinned.by_index if point.pinned else {}).items()}
                for name, point in points.items()}  # fmt: skip
     assert degrees["a"] == degrees["b"] == pytest.approx({5: 30})
     assert degrees["c"] == pytest.approx({2: 10, 5: 20})
+    assert degrees["s"] == pytest.approx({2: 10, 5: 20})
     assert points["b"].velocity is None
     assert points["b"].acceleration is None
     assert points["c"].velocity == pytest.approx((0, 0, 0, np.radians(9), 0, 0))

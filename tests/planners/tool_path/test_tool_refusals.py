@@ -271,3 +271,14 @@ def test_a_tangent_ends_where_the_path_turns_it_to():
 def test_a_screw_says_with_what_a_whole_orientation_is_given():
     error = refusal("ur5e", START, {"planner": "screw", "to": {"xyz": [0.4, 0.2, 0.1], "direction": "z"}})
     assert error.problems[0].hint == "give `rpy`, `quat_wxyz`, `matrix`, `axis_angle` or `euler`"
+
+
+@pytest.mark.parametrize("planner", ["line", "screw"])
+def test_what_goes_to_one_target_ends_there_at_rest(planner):
+    error = refusal("ur5e", START, {"planner": planner, "to": {**TO, "velocity": [0, 0, 0, 0, 0, 0.1]}})
+    assert f"{planner} ends at rest" in str(error)
+
+
+def test_no_screw_turns_otherwise_than_about_its_axis():
+    error = refusal("ur5e", START, {"planner": "screw", "to": TO, "orientation": "euler"})
+    assert "unknown key 'orientation'" in str(error)
