@@ -274,9 +274,12 @@ def test_a_screw_says_with_what_a_whole_orientation_is_given():
 
 
 @pytest.mark.parametrize("planner", ["line", "screw"])
-def test_what_goes_to_one_target_ends_there_at_rest(planner):
-    error = refusal("ur5e", START, {"planner": planner, "to": {**TO, "velocity": [0, 0, 0, 0, 0, 0.1]}})
-    assert f"{planner} ends at rest" in str(error)
+def test_the_branch_that_a_target_names_is_the_one_on_which_the_tool_arrives(planner):
+    """On a path the arm keeps its branch: of both elbows, one is that of the start."""
+    above, below = ({"planner": planner, "to": {**TO, "configuration": {"elbow": e}}} for e in ("up", "down"))
+    plan("ur5e", START, above)
+    error = refusal("ur5e", START, below)
+    assert re.search(r"arrives in the configuration [a-z_ ]*\bup\b[a-z_ ]*, not down", str(error))
 
 
 def test_no_screw_turns_otherwise_than_about_its_axis():
