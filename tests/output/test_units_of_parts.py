@@ -214,3 +214,66 @@ def test_a_number_that_is_zero_or_a_list_that_is_empty_is_no_part_that_is_missin
     assert explanation.ScrewSegmentReport(**screw).model_dump() == {**screw, **units}
     path: dict[str, Any] = {"length": 0.0, "unit": "m", "segments": [], "corners": [], "law": []}
     assert explanation.PathReport(**path).model_dump() == path
+
+
+MAY_BE_NULL = {  # beside the fields whose description says so
+    "FastestReport": "above",
+    "LowestSpeedReport": "joint",
+    "ToolReport": "held lowest",
+    "MoveReport": "binding savings reference",
+    "FindingReport": "move joint hint",
+    "EventReport": "move",
+    "WorstOfRows": "move",
+    "RowsReport": "worst",
+    "Report": "savings",
+    "PolynomialReport": "velocity acceleration",
+    "PhaseReport": "joint",
+    "ExplainedMove": "from_pose to_pose closed_form closed_form_derivatives blends arrivals waypoints outside path",
+    "SavingReport": "share reason",
+    "ReferenceReport": "joint reason",
+    "PathReferenceReport": "ratio use own_use reason",
+    "ConsumerFinding": "joint hint",
+    "EffortReport": "head_room",
+    "ZoneReport": "joint farthest deviation turn",
+}
+
+
+def test_what_is_not_known_or_not_there_can_stand_in_a_report() -> None:
+    """A bound that is infinite, or a duration that was not found, is null within its list."""
+    said = {
+        (part, name)
+        for part, kind in PARTS.items()
+        for name, field in kind.model_fields.items()
+        if re.search(r"\\bnull\\b", field.description or "", re.IGNORECASE)
+    }
+    for part, name in sorted(
+        said | {(part, n) for part, names in MAY_BE_NULL.items() for n in names.split()}
+    ):
+        annotation = PARTS[part].model_fields[name].annotation
+        within = {"limit": (None, None), "found": [None]} if part != "ToolPeakReport" else {}
+        given = within.get(name)
+        assert TypeAdapter(annotation).validate_python(given) == given, (part, name)
+
+
+def test_three_parts_alone_leave_out_what_there_is_not() -> None:
+    """A program finds in each other part the same keys, whatever there is."""
+    sparse = set()
+    for part, kind in PARTS.items():
+        empty = kind.model_construct(**dict.fromkeys(kind.model_fields)).model_dump(warnings=False)
+        if empty.keys() != kind.model_fields.keys():
+            sparse.add(part)
+    assert sparse == {"PoseReport", "ScrewSegmentReport", "PathReport"}
+
+
+@pytest.mark.parametrize(
+    ("part", "field", "given", "written"),
+    [
+        ("PoseReport", "singular", False, "false"),
+        ("PoseReport", "rank", {"here": 3}, '{"here":3}'),
+        ("ExplainedMove", "binding_phases", True, "true"),
+        ("ChoiceReport", "candidates", 8, "8"),
+    ],
+)
+def test_truth_and_counts_are_written_as_such(part: str, field: str, given: Any, written: str) -> None:
+    kind = TypeAdapter(PARTS[part].model_fields[field].annotation)
+    assert kind.dump_json(kind.validate_python(given)).decode() == written
