@@ -129,6 +129,13 @@ def test_what_is_not_there_is_not_converted() -> None:
     assert in_units(peak, Units("deg", "mm")).limit == (None, 2000.0)
 
 
+@pytest.mark.parametrize("unit", ["N m", "N", "s", "1", ""])
+def test_what_is_no_length_and_no_angle_stays_as_it_is(unit: str) -> None:
+    finding = report.FindingReport.model_construct(value=5.0, limit=4.0, unit=unit)
+    converted = in_units(finding, Units("deg", "mm"))
+    assert (converted.value, converted.limit, converted.unit) == (5.0, 4.0, unit)
+
+
 STATED = {  # what a part says where nobody says otherwise
     "Report.version": 1,
     "ToolReport.method": "sampled",
