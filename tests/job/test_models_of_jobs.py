@@ -60,6 +60,11 @@ def test_rows_are_at_1000_hz_with_three_derivatives_unless_said_otherwise() -> N
         ("{columns: [t, q, qd, q]}", "the columns 'q' stand twice", "q"),
         ("{columns: [q, t, q]}", "the columns 'q' stand twice", "q"),
         ("{columns: [t, signals]}", "no move of the job sets a signal", "signals"),
+        ("{times: []}", "the list is too short: expected at least 1", "[]"),
+        ("{columns: []}", "the list is too short: expected at least 1", "[]"),
+        ("{align: 1}", "expected true or false, got 1", "1"),
+        ("{rate: 0}", "expected a number above 0 Hz, got 0", "0"),
+        ("{rate: 5 ms}", "5 ms", "5 ms"),
         ("{in: tabel}", "there is no frame 'tabel'", "tabel"),
         ("{in: tool}", "there is no frame 'tool'", "tool"),
     ],
@@ -162,6 +167,12 @@ def test_a_name_is_of_a_point_or_of_a_frame() -> None:
         "'b' is a point and a frame",
         "'c' is a point and a frame",
     ]
+
+
+@pytest.mark.parametrize("moves", ["{planner: hold, duration: 1}", "hold", "3"])
+def test_moves_are_a_list(moves: str) -> None:
+    with pytest.raises(InputError, match="expected a list, got"):
+        job_from_text(f"version: 1\nrobot: {{joints: 2}}\nstart: {{joints: 0}}\nmoves: {moves}\n")
 
 
 def test_moves_are_read_by_their_planner_or_by_what_they_do() -> None:
