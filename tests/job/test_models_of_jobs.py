@@ -44,6 +44,7 @@ def test_rows_are_at_1000_hz_with_three_derivatives_unless_said_otherwise() -> N
     assert (output.start_time, output.align, output.frame, output.consumer) == (0.0, False, None, None)
     assert (output.units.angle, output.units.length) == (None, None)
     assert job().job.when_over_limit == "error"
+    assert job().units == Units("rad", "m")
     assert job(more="units: {length: mm}").units == Units(length="mm")
     assert job(more="output: {times: [0, 0.5, 1]}").job.output.times == (0, 0.5, 1)
 
