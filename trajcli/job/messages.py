@@ -174,6 +174,8 @@ def _flaws(
             return []  # the key that stands for it is unknown, and says so
         field = _model_at(model, loc[:-1]).model_fields[name]
         return [(path, f"`{name}` is missing", _described(field), False)]
+    if kind == "too_short" and len(detail["input"]) >= context["min_length"]:
+        return []  # entries that are wrong, and say so, are not counted
     if kind == "union_tag_invalid":
         return [((*path, "planner"), *_unknown_planner(detail["input"]), False)]
     message, hint = _text(kind, context, detail["input"])

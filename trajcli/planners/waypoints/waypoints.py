@@ -16,6 +16,7 @@ from trajcli.errors import Amount, MissingLimitError, PlanningError, Problem
 from trajcli.frozen import comparable
 from trajcli.kinematics.robot import QUANTITIES, Robot
 from trajcli.language.numbers import (
+    NO_TRUTH,
     FieldType,
     Flaw,
     FlawError,
@@ -80,6 +81,7 @@ class FastestThroughPoints(PointSequence):
     planner: Literal["waypoints"] = "waypoints"
     starts: Annotated[
         Literal[1, 2, 3, 4, 5, 6, 7, 8],
+        NO_TRUTH,
         Field(description="How many starting points of the search are tried, of a fixed order."),
     ] = 4
     minimum_durations: (
