@@ -63,6 +63,8 @@ def test_rows_are_at_1000_hz_with_three_derivatives_unless_said_otherwise() -> N
         ("{columns: [t, signals]}", "no move of the job sets a signal", "signals"),
         ("{times: []}", "the list is too short: expected at least 1", "[]"),
         ("{columns: []}", "the list is too short: expected at least 1", "[]"),
+        ("{columns: [foo]}", "signals or move, got", "foo"),
+        ("{times: [1 m]}", "expected a time", "1 m"),
         ("{align: 1}", "expected true or false, got 1", "1"),
         ("{rate: 0}", "expected a number above 0 Hz, got 0", "0"),
         ("{rate: 5 ms}", "5 ms", "5 ms"),

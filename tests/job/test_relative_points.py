@@ -189,6 +189,12 @@ def test_advice_about_what_cannot_stand_beside_from_works(
         "  a: {from: here, ofset: {}}\n",
         "  j: {joints: 0}\n  a: {from: j, frame: z}\n",
         "  p: {xyz: [1, 2, 3]}\n  a: {from: p}\n",
+        "  a: {joint: 3}\n",
+        "  a: {xzy: [1, 2, 3], rpy: [0, 0, 0]}\n",
+        "  a: {xyz: [1, 2, 3], rpyy: [0, 0, 0]}\n",
+        "  a: {xyz: [1, 2, 3], rpy: [0, 0, 0], joints: {elbow_joint: x}}\n",
+        "  a: {xyz: [1, 2, 3], rpy: [0, 0, 0], configuration: {elbow: upp}}\n",
+        "  p: {xyz: [1, 2, 3], rpy: [0, 0, 0]}\n  a: {from: p, joints: {elbow_joint: x}}\n",
     ],
 )
 def test_a_flaw_of_a_point_is_not_said_again_by_those_relative_to_it(flawed: str) -> None:

@@ -23,6 +23,9 @@ moves:
   - {planner: spline, through: {positions: [3, [1 mm, 2], {a: 1, b: 2 mm}]}}
   - {planner: quintic, to: {joints: {a: 1 m, b: -.5 mm}, velocity: 3 mm/s}}
   - {planner: quintic, to: {joints: [1 m, true, oops]}}
+  - {planner: quintic, to: {xyz: [1, 2, 3], joints: {a: 1 m}}}
+  - {planner: quintic, to: {xyz: [1, 2, 3], joints: {b: no}}}
+  - {planner: quintic, to: {joints: [1, 2], xyz: [4, 5, 6]}}
 """
 
 
@@ -34,7 +37,7 @@ def test_what_a_joint_decides_is_not_asked_of_a_robot_with_flaws(robot: str) -> 
         job_from_text(text, "job.yaml")
     found = [(p.place.line, p.place.column) for p in caught.value.problems if p.place]
     lines = text.splitlines()
-    wrong = [(4, "-1]"), (10, "true"), (10, "oops")]
+    wrong = [(4, "-1]"), (10, "true"), (10, "oops"), (12, "no"), (13, "[4")]
     assert found[0][0] == 2
     assert found[1:] == [(line, lines[line - 1].index(word) + 1) for line, word in wrong]
 

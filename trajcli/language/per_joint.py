@@ -199,6 +199,8 @@ class PerJoint(FieldType):
         names = context.joint_names
         if isinstance(value, Mapping) and names is not None and len(value) < len(names):
             return NamedValues(values, (name in value for name in names))
+        if isinstance(value, Mapping) and self.some and names is None and context is not SI:
+            return NamedValues(values, (True for _ in values))  # how many there are is not known
         return values
 
     def write(

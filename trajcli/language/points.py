@@ -242,24 +242,29 @@ def _of_point(name: str, context: ReadingContext) -> _Fields:
     last = chain.pop()
     fields = context.shifted.get(last)
     if fields is None:
-        fields = dict(_mapping(last, context))
-        if "in" in fields:
-            fields = context.shifted[last] = _elsewhere(partial(_in_world, fields, context))
-        elif "from" in fields:
-            fields = context.shifted[last] = _elsewhere(partial(_moved, fields, HERE, None, context))
+        own = _mapping(last, context)
+        make: Callable[[], _Fields] = partial(dict, own)
+        if "in" in own:
+            make = partial(_in_world, own, context)
+        elif "from" in own:
+            make = partial(_moved, own, HERE, None, context)
+        fields = context.shifted[last] = _elsewhere(make, context)
     for link in reversed(chain):
         moved = partial(_moved, context.points[link], last, fields, context)
-        fields, last = _elsewhere(moved), link
+        fields, last = _elsewhere(moved, context), link
         context.shifted[link] = fields
     return fields
 
 
-def _elsewhere(make: Callable[[], _Fields]) -> _Fields:
+def _elsewhere(make: Callable[[], _Fields], context: ReadingContext) -> _Fields:
     """Return the fields of another point, whose flaws are reported where that stands."""
     try:
-        return make()
+        fields = make()
     except FlawError:
         raise _flaw_elsewhere() from None
+    if not _is_target(fields, context):
+        raise _flaw_elsewhere()
+    return fields
 
 
 def _in_world(value: Mapping[str, Any], context: ReadingContext) -> _Fields:
@@ -338,10 +343,7 @@ def _pose_of(name: str, point: _Fields, context: ReadingContext) -> PoseFields:
         raise FlawError(
             f"the point '{name}' is given without a pose: nothing is relative to it", "from", hint=hint
         )
-    try:
-        return PoseFields.model_validate(given, context=context)
-    except ValidationError:
-        raise _flaw_elsewhere() from None
+    return PoseFields.model_validate(given, context=context)
 
 
 def _displaced(name: str, pose: PoseFields, offset: Array, axes: Array | None) -> _Fields:

@@ -311,6 +311,8 @@ class Target(PoseFields, defer_build=False):  # made once, not for each planner 
             return self
         if not self.gives_pose and self.relative is None:
             names = info.context.joint_names if info.context is not None else ()
+            if names is None:
+                return self
             lacking = [name for name, named in zip(names, self.joints.named, strict=True) if not named]
             text, hint = f"no value for {', '.join(lacking)}", "name every joint, or give a list"
             raise refuse([(("joints",), text, hint)])

@@ -147,6 +147,8 @@ def test_what_is_right(change: dict[str, Any]) -> None:
         moves({**MOVE, "to": {"offset": {"xyz": [0, 0, 0.1]}}}),
         moves({**MOVE, "to": {"from": "b", "xyz": [0, 0, 1]}}),
         moves({**MOVE, "to": {"from": "b", "blend": 1}}),
+        moves({"planner": "waypoints", "through": ["a"], "to": "b", "starts": True}),
+        moves({"planner": "waypoints", "through": ["a"], "to": "b", "starts": 9}),
         {"robot": "ur5f"},
         {"robot": {"rail": {"axis": [1, 0, 0]}, "arm": "ur5f"}},
     ],
