@@ -7,6 +7,7 @@ import csv
 import json
 import pickle
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -30,6 +31,7 @@ CUBIC = {
     "start": {"joints": 20},
     "moves": [{"planner": "cubic", "to": {"joints": [50]}, "duration": 1}],
 }
+START_AND_MOVES = "version: 1\nstart: {joints: 0}\nmoves: [{planner: hold, duration: 1}]\n"
 TEXT = """
 version: 1
 units: {angle: deg}
@@ -291,6 +293,13 @@ def test_an_arm_answers_questions() -> None:
     assert robot.ik(far) == ()
 
 
+def test_the_arm_of_a_job_has_its_base_and_its_tool(tmp_path: Path) -> None:
+    (tmp_path / "job.yaml").write_text("robot: planar2r\nbase: {xyz: [1, 0, 0]}\n" + START_AND_MOVES)
+    plain, of_job = trajcli.load_robot("planar2r"), trajcli.load_robot(tmp_path / "job.yaml")
+    shift = np.array([[0, 0, 0, 1.0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]])
+    np.testing.assert_allclose(of_job.fk([0.5, 0.25]), plain.fk([0.5, 0.25]) + shift, atol=1e-15)
+
+
 @pytest.mark.full
 def test_the_page_runs_as_it_stands(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     page = (ROOT / "docs/python.md").read_text(encoding="utf-8")
@@ -381,6 +390,11 @@ def test_arguments_that_mean_nothing_are_refused(tmp_path: Path) -> None:
         (lambda: trajcli.view(job, page, robot="ur5e"), "robot: it is for files of rows"),
         (lambda: trajcli.view(job, page, meshes=-1), "meshes: expected megabytes, 0 at least, got -1"),
         (lambda: trajcli.resample(table, "100"), "rate: expected rows per second above 0"),  # type: ignore[arg-type]
+        (lambda: trajcli.sweep(job, "moves.0.duration=1"), "vary: expected a mapping of paths to values"),  # type: ignore[arg-type]
+        (lambda: trajcli.sweep(job, {"moves.0.duration": 1.0}), "moves.0.duration has no values"),  # type: ignore[dict-item]
+        (lambda: trajcli.sweep(job, {"moves.0.duration": np.array(1.0)}), "moves.0.duration has no values"),
+        (lambda: trajcli.plan(job, consumer=table), "there is no profile"),  # type: ignore[arg-type]
+        (lambda: trajcli.schema_of("jobs"), "there is no schema 'jobs'"),  # type: ignore[arg-type]
         (lambda: trajcli.resample(table, True), "rate: expected rows per second above 0, got True"),
         (lambda: trajcli.plan({"moves": endless}), "more than 100 levels deep"),
     ):
@@ -398,6 +412,11 @@ def test_one_name_serves_where_several_may_stand(tmp_path: Path) -> None:
         job, tmp_path / "two.svg", over=[tmp_path / "job.csv"], quantities=["q", "qd"], joints=["j1"]
     )
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
+    assert trajcli.plan(job, overrides="moves.0.duration=3").trajectory.duration == 3
+    values: list[Iterable[float]] = [[1.0, 2.0], np.array([1.0, 2.0]), (value for value in (1.0, 2.0))]
+    for points in values:
+        table = trajcli.sweep(job, {"moves.0.duration": points}, processes=1)
+        assert [row.point.duration for row in table.rows] == [1.0, 2.0]
 
 
 def test_the_text_of_a_job_in_one_line_is_a_job_everywhere(tmp_path: Path) -> None:

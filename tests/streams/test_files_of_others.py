@@ -35,6 +35,7 @@ def written(folder: Path, content: str | bytes, name: str = "in.csv") -> Path:
         (",q1,q2\n", ("column 1", "q1", "q2"), 1),  # the index of a data frame
         ('"","q1","q2"\n', ("column 1", "q1", "q2"), 1),
         ('t,"joint 1, left","joint 1, right"\n', ("t", "joint 1, left", "joint 1, right"), 1),
+        ('t,"joint 1; left","joint 2; left"\n', ("t", "joint 1; left", "joint 2; left"), 1),
     ],
 )
 def test_names_are_found_behind_marks_comments_and_in_quotes(
@@ -86,8 +87,10 @@ def test_a_column_is_named_by_what_stands_before_its_unit(tmp_path: Path) -> Non
     found = open_motion(written(tmp_path, text), columns="t=Zeit,q=Achse").whole()
     np.testing.assert_allclose(found.t, ROWS[:, 0] / 1000, rtol=1e-15)
     np.testing.assert_allclose(found.q, np.radians(ROWS[:, 1:]), rtol=1e-15)
-    with pytest.raises(InputError, match="there is no column 'Achse'"):
-        open_motion(written(tmp_path, text), columns="t=Zeit,q1=Achse,q2=Achse 2")  # which of two it is
+    for name in ("Achse", "axis"):  # which of two it is
+        two = text.replace("Achse", name)
+        with pytest.raises(InputError, match=f"there is no column '{name}'"):
+            open_motion(written(tmp_path, two), columns={"t": "Zeit", "q1": name, "q2": f"{name} 2"})
 
 
 @pytest.mark.parametrize(

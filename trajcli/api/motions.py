@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from functools import partial
 from numbers import Real
@@ -346,7 +346,7 @@ def batch(
 
 def sweep(
     job: str | Path | Mapping[str, Any],
-    vary: Mapping[str, str | Sequence[Any]],
+    vary: Mapping[str, str | Iterable[Any]],
     output: str | Path | None = None,
     *,
     samples: int | None = None,
@@ -380,6 +380,8 @@ def sweep(
     from trajcli.job.yaml.document import read_bytes
 
     count = _processes(processes, timeout)
+    if not isinstance(vary, Mapping):
+        raise InputError(f"vary: expected a mapping of paths to values, got {vary!r}")
     if isinstance(job, Mapping) or (isinstance(job, str) and is_yaml(job)):
         file, content = "<text>", (mapping_text(job) if isinstance(job, Mapping) else job).encode()
     else:

@@ -14,7 +14,6 @@ from trajcli.errors import InputError, TrajcliError
 from trajcli.frozen import frozen
 from trajcli.job.read import LoadedJob, job_from_text, load_job
 from trajcli.job.report import Report
-from trajcli.job.robot import load_sheet
 from trajcli.kinematics.robot import Limits, Robot
 from trajcli.output.delivery.delivered import delivered, report_as_delivered
 from trajcli.planning.plan import Plan
@@ -195,8 +194,11 @@ def plan(
         FileError: When a file cannot be read.
     """
     try:
-        said = [*overrides, *(() if rows is None else (f"output.rows={rows}",))]
-        planned, digits = delivered(_loaded(job, said), consumer, rows=rows is not None)
+        said = [
+            *([overrides] if isinstance(overrides, str) else overrides),
+            *(() if rows is None else (f"output.rows={rows}",)),
+        ]
+        planned, digits = delivered(_loaded(job, said), consumer and str(consumer), rows=rows is not None)
     except TrajcliError as error:
         for problem in error.problems:
             where = "" if problem.place is None else str(problem.place)
@@ -244,13 +246,15 @@ def check(
 
 
 def load_robot(name: str | Path) -> Arm:
-    """Return a robot of the catalogue by its name, or of a robot file or a URDF by its path.
+    """Return a robot of the catalogue by its name, or of a robot file, a URDF or a job by its path.
 
     Raises:
         InputError: When the catalogue has no such robot, or with every flaw of the file.
         FileError: When the file cannot be read.
     """
-    return Arm(**vars(load_sheet(name if isinstance(name, Path) else str(name)).robot))
+    from trajcli.queries.arm import open_sheet
+
+    return Arm(**vars(open_sheet(str(name)).robot))
 
 
 def _loaded(job: str | Path | Mapping[str, Any] | LoadedJob, overrides: Sequence[str]) -> LoadedJob:

@@ -10,7 +10,7 @@ import json
 import math
 import random
 import re
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from decimal import Decimal
 from fractions import Fraction
@@ -88,15 +88,18 @@ def parse_axis(text: str) -> Axis:
     return axis_of(path.strip(), listed)
 
 
-def axis_of(path: str, values: Sequence[Any]) -> Axis:
+def axis_of(path: str, values: Iterable[Any]) -> Axis:
     """Return the axis of a path and its values.
 
     Raises:
         InputError: When there are none.
     """
-    if len(values) == 0:
+    listed: tuple[Any, ...] = ()
+    with suppress(TypeError):  # of one value alone
+        listed = tuple(values)
+    if not listed:
         raise InputError(f"{path} has no values", hint='give a list such as [1, 2], or a text: "1..3:9"')
-    return Axis(path, tuple(map(value_text, values)))
+    return Axis(path, tuple(map(value_text, listed)))
 
 
 def _spread(text: str, first: str, last: str, count: str | None) -> Iterator[float]:

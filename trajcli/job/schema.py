@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any, Literal
 
+from trajcli.errors import InputError
+
 SchemaKind = Literal["job", "robot", "report", "explanation"]
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _TITLES = {
@@ -21,7 +23,13 @@ def schema_text(kind: SchemaKind) -> str:
 
 
 def schema_of(kind: SchemaKind) -> dict[str, Any]:
-    """Return the JSON Schema of a job file, a robot file, a report, or an explanation."""
+    """Return the JSON Schema of a job file, a robot file, a report, or an explanation.
+
+    Raises:
+        InputError: When the kind is none of these.
+    """
+    if kind not in _TITLES:
+        raise InputError(f"there is no schema {kind!r}", hint=f"the kinds are {', '.join(_TITLES)}")
     schema = {"job": _job, "robot": _robot, "report": _report, "explanation": _explanation}[kind]()
     return {"$schema": _DIALECT, **_without_titles(schema), "title": _TITLES[kind]}
 
