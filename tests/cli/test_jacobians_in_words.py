@@ -106,3 +106,34 @@ def test_rows_have_the_frame_that_is_asked_for(arms: Arms) -> None:
     assert (
         np.abs(told - np.array(arms.json(*words[:-1], "world", "0.1", "0.2", "0.3")["jacobian"])).max() > 0.1
     )
+
+
+@pytest.mark.parametrize(
+    ("arm", "q", "measure", "rank"),
+    [
+        ("planar2r", [30, 90], 0.3 * 0.2, 2),  # a1 a2 |sin q2|
+        ("planar2r", [30, -20], 0.3 * 0.2 * np.sin(np.radians(20)), 2),
+        ("planar2r", [30, 0], 0, 1),  # stretched
+        ("planar2r", [30, 180], 0, 1),
+        ("planar3r", [30, 90, 90], np.sqrt(0.06**2 + 2 * 0.02**2), 2),  # by Cauchy and Binet
+        ("planar3r", [30, 0, 0], 0, 1),
+        ("rrp", [10, 0, 0.2], 0, 2),  # the first axis goes through the tool, but for the offset
+        ("cartesian", [0, 0, 0], 1, 3),
+        ("ur5e", [0, -90, 90, 0, 90, 0], None, 3),
+    ],
+)
+def test_the_position_alone_has_the_manipulability_of_textbooks(
+    arm: str, q: list[float], measure: float | None, rank: int, arms: Arms
+) -> None:
+    """Of an arm in a plane they count two rows; of all six rows even a stretched arm has rank 2."""
+    told = arms.json("jacobian", "-r", arm, *q)["position"]
+    lines = arms.call("jacobian", "-r", arm, *q).out.splitlines()
+    (line,) = [line for line in lines if line.startswith("position alone: ")]
+    if measure is None:
+        rows = np.array(arms.json("jacobian", "-r", arm, *q)["jacobian"])[:3]
+        measure = float(np.sqrt(np.linalg.det(rows @ rows.T)))
+    assert told["manipulability"] == pytest.approx(measure, abs=1e-12)
+    assert told["rank"] == rank
+    singular = measure == 0
+    assert (told["rank"] < told["nearby"], line.endswith("nearby: singular")) == (singular, singular)
+    assert f" (in m), rank {rank}" in line

@@ -44,6 +44,10 @@ def _lines(arm: ArmInUnits, report: dict[str, Any], frame: str) -> Iterator[str]
     condition = "infinite" if report["condition"] is None else number(report["condition"])
     yield f"condition number: {condition} (lengths divided by the length of the arm)"
     yield f"rank: {report['rank']}"
+    alone = report["position"]
+    of_position = f"manipulability {number(alone['manipulability'])} (in m), rank {alone['rank']}"
+    singular = f", which is {alone['nearby']} nearby: singular" if alone["rank"] < alone["nearby"] else ""
+    yield f"position alone: {of_position}{singular}"
     for direction in report["singular_directions"]:
         yield f"always zero: {_sum(direction, _COMPONENTS)} (in m/s and rad/s)"
     for motion in report["idle_motions"]:

@@ -10,6 +10,7 @@ import numpy as np
 from trajcli.curves.piecewise import Array
 from trajcli.kinematics.dexterity import dexterity, singular_directions
 from trajcli.kinematics.forward import forward
+from trajcli.kinematics.inverse.target import partial_target, ranks
 from trajcli.kinematics.jacobian import ReferenceFrame, jacobian, jacobian_dot_qd
 from trajcli.queries.arm import ArmInUnits
 from trajcli.queries.pose import plain
@@ -21,12 +22,13 @@ _ALIKE = 9  # decimals by which sizes differ: which of two alike is the larger o
 def jacobian_report(
     arm: ArmInUnits, q: Array, frame: ReferenceFrame, qd: Array | None = None
 ) -> dict[str, Any]:
-    """Return {jacobian, manipulability, condition, rank, singular_directions, idle_motions, jdot_qd?}.
+    """Return {jacobian, manipulability, condition, rank, position, singular_directions, idle_motions, ...}.
 
     With joint rates in rad and the arm's unit of length, `jacobian` (6, n) gives the tcp's linear velocity in
     that unit of length and its angular one in rad, by second, as textbooks do whatever the unit of angles is.
     `manipulability` is in m and rad; `condition` is of the Jacobian scaled by the arm's length, None where
-    the rank is lost. `singular_directions` are unit vectors u with u J = 0 for the J in m and rad:
+    the rank is lost. `position` says of the linear rows alone their manipulability, in m, their rank, and
+    their rank nearby. `singular_directions` are unit vectors u with u J = 0 for the J in m and rad:
     components of the velocity (v, w), in the axes of `frame`, that are zero for all joint rates.
     `idle_motions` are unit vectors of joint rates, in rad and m, that leave the tcp at rest.
 
@@ -48,12 +50,20 @@ def jacobian_report(
         "manipulability": float(measures.manipulability),
         "condition": condition if np.isfinite(condition) else None,
         "rank": int(measures.rank),
+        "position": _of_position(arm, q),
         "singular_directions": plain(_directions(arm, q, frame, lost.blocked, lost.length)),
         "idle_motions": plain(simplest(lost.idle)),
     }
     if qd is not None:
         result["jdot_qd"] = plain(jacobian_dot_qd(arm.robot, q, qd, frame) / in_rad.twist_factors)
     return result
+
+
+def _of_position(arm: ArmInUnits, q: Array) -> dict[str, Any]:
+    """Return manipulability, rank and rank nearby of the position, which is singular where they differ."""
+    (rank,), nearby = ranks(arm.robot, q[None], partial_target(np.zeros(3)))
+    values = np.linalg.svd(jacobian(arm.robot, q)[:3], compute_uv=False)
+    return {"manipulability": float(values[:nearby].prod()), "rank": int(rank), "nearby": nearby}
 
 
 def _directions(arm: ArmInUnits, q: Array, frame: ReferenceFrame, blocked: Array, length: float) -> Array:
