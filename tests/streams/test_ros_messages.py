@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from trajcli.errors import InputError
 from trajcli.streams.ros_messages import JointMessage, read_ros_yaml
@@ -121,3 +123,12 @@ def test_numbers_with_exponents_alone_are_numbers_with_any_sign(tmp_path: Path) 
     found = read(tmp_path / "a.yaml", message(first="[-1e-05, 1e-05]", last="[+1e1, -5e+0]"))
     assert found.position.tolist() == [[-1e-05, 1e-05], [10.0, -5.0]]
     assert found.decimals[1:].tolist() == [5, 5]
+
+
+@pytest.mark.parametrize("number", [7e-9, -2e-5, 1.5e-8, 3e-10])
+def test_a_point_that_yaml_asks_for_is_no_decimal(tmp_path: Path, number: float) -> None:
+    """As PyYAML, and so ROS 2 and `convert`, print numbers: 7.0e-09 has nine decimals, as 0.000000007 has."""
+    printed = yaml.safe_dump(number, default_flow_style=True).split()[0]
+    found = read(tmp_path / "a.yaml", message(first=f"[{printed}, 0.5]"))
+    assert found.position[0, 0] == number
+    assert found.decimals[1] == -Decimal(repr(number)).as_tuple().exponent

@@ -129,7 +129,8 @@ def _loader() -> Any:  # noqa: ANN401
 
     def number(loader: Any, node: Any) -> float:  # noqa: ANN401
         value = WrittenNumber(loader.construct_yaml_float(node))
-        value.decimals = decimals_of(node.value.encode()) if isfinite(value) else 0
+        shown = node.value.lower().replace(".0e", "e")  # YAML 1.1 asks for the point
+        value.decimals = decimals_of(shown.encode()) if isfinite(value) else 0
         return value
 
     form = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$")
