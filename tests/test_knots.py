@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -239,6 +240,27 @@ def test_around_a_step_of_the_acceleration_quintics_stay_within_both_sides() -> 
     cruising = (t > 0.25 + 3e-4) & (t < 1.0 - 3e-4)
     assert np.abs(acceleration[cruising]).max() <= 4e-3
     assert np.abs(position - trajectory(t)).max() <= knots.deviation.position * (1 + 1e-6) <= 2.1e-8
+
+
+@pytest.mark.parametrize("period", [0.25, 0.2499, 0.2501, 0.2502])
+def test_rows_of_a_rate_beside_a_step_are_on_the_quintics_between_its_knots(period: float) -> None:
+    """From 4 to 0 rad/s^2 at 0.25 s, within 0.2 ms about it: rows there and behind make no 21st part beyond."""
+    move = {"planner": "trapezoid", "to": {"joints": [1, 0.1, -0.2]}, "velocity": 1.0, "acceleration": 4.0}
+    trajectory = trajectory_of_job(move, velocity=9, acceleration=90)
+    knots = knots_of(trajectory)
+    grid = knot_grid(trajectory, knots, 1 / period)
+    motion = np.stack([trajectory(grid.local, order) for order in range(3)], axis=1)
+    grid.put_states(0, (0, 1, 2), motion)
+    rows = replace(
+        knots,
+        nanoseconds=np.rint(grid.local * 1e9).astype(np.int64),
+        position=motion[:, 0],
+        velocity=motion[:, 1],
+        acceleration=motion[:, 2],
+    )
+    t = 0.25 + np.linspace(-1e-3, 1e-3, 20_001)
+    assert np.abs(played(rows, t) - played(knots, t)).max(axis=(1, 2)) == pytest.approx(0, abs=4e-3)
+    assert period == 0.25 or period in rows.times.round(9)
 
 
 @pytest.mark.parametrize("rate", [100.0, 999.9, 1000 / 7])

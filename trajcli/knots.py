@@ -168,7 +168,8 @@ def knot_grid(
 ) -> KnotGrid:
     """Return the grid of rows at the knots of a trajectory, with a rate also at its times between them.
 
-    A time of the rate that is nearer to a knot than a microsecond has no row of its own.
+    A time of the rate that is nearer to a knot than a microsecond has no row of its own. Beside a step of the
+    acceleration rows are on the quintics between the knots: the curve has no such knot behind it.
 
     Args:
         trajectory: Whose knots they are.
@@ -188,10 +189,25 @@ def knot_grid(
     nearest = np.minimum(
         np.abs(uniform - times[after - 1]), np.abs(times[np.minimum(after, times.size - 1)] - uniform)
     )
-    local = np.concatenate([times, uniform[nearest > _NEAREST / _PER_SECOND]])
+    far = nearest > _NEAREST / _PER_SECOND
+    uniform, after = uniform[far], after[far]
+    moved = (_states(trajectory, knots.nanoseconds)[0] != knots.position).any(axis=1)
+    beside = moved[after] | moved[after - 1]
+    joined = _between(knots, uniform[beside], after[beside])
+    states = np.concatenate([states, joined], axis=1)
+    local = np.concatenate([times, uniform[beside], uniform[~beside]])
     order = np.argsort(local, kind="stable")
-    at = np.flatnonzero(order < times.size)
-    return KnotGrid(duration, local[order], at, states, start_time)
+    at = np.flatnonzero(order < states.shape[1])
+    return KnotGrid(duration, local[order], at, states[:, order[at]], start_time)
+
+
+def _between(knots: Knots, local: Array, after: NDArray[np.intp]) -> Array:
+    """Return the states of quintics between knots, (3, k, n), at times before the knots `after`, (k,)."""
+    states = np.stack([knots.position, knots.velocity, knots.acceleration]).transpose(0, 2, 1)
+    first, last = knots.times[after - 1], knots.times[after]
+    joined = hermite_coefficients(states[..., after - 1], states[..., after], last - first)
+    shifted = taylor_shift(joined, local - first)
+    return np.stack([shifted[-1], shifted[-2], 2 * shifted[-3]]).transpose(0, 2, 1)
 
 
 def _deviation(missed: Array) -> Deviation:

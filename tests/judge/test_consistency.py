@@ -197,6 +197,20 @@ def test_a_jump_may_last_longer_than_its_stamps_say(share: float, broken: bool, 
 
 
 @SIDES
+@pytest.mark.parametrize(("step", "jumps"), [(0.0, False), (0.02, True)])
+def test_a_velocity_that_changes_evenly_over_uneven_rows_does_not_jump(
+    step: float, jumps: bool, side: int
+) -> None:
+    """2 % over the limit of the acceleration throughout: where some rows are missing it goes on as it did."""
+    t = np.delete(1e-3 * np.arange(40), np.s_[14:21])
+    fast = side * (1.02 * t + np.where(t > 0.0135, step, 0.0))
+    q = np.append(0.0, np.cumsum(0.5 * (fast[1:] + fast[:-1]) * np.diff(t)))
+    limits = replace(unlimited(1), acceleration=np.array([[-1.0, 1.0]]))
+    found = inconsistent(rows(q, fast, t=t), limits)
+    assert [(each.kind, each.quantity, each.row) for each in found] == [("jump", "velocity", 14)] * jumps
+
+
+@SIDES
 def test_rates_of_a_joint_that_rests_are_no_jump_of_its_position(side: int) -> None:
     qd = np.zeros(COUNT)
     qd[8:18] = side * 0.5

@@ -4,8 +4,8 @@ Over an interval of length T positions must change by what velocities say, T tim
 step in acceleration within or beside the interval may add: T^2 times the difference of the slopes of the
 velocity beside each other. Accelerations likewise, up to T times the difference of their changes.
 
-A change between two rows is a jump where its neighbours are much smaller: more than the limit of the next
-derivative allows, or more than the columns that say how fast it changes.
+A change between two rows is a jump where its neighbours are much smaller, and slower: more than the limit of
+the next derivative allows, or more than the columns that say how fast it changes.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from trajcli.kinematics.robot import Limits
 from trajcli.limits.tolerances import JUMP_ABSOLUTE, JUMP_RELATIVE, exceeds
 
 _ISOLATED = 4.0  # times the changes beside it: a motion that merely is fast changes from row to row alike
+_FASTER = 2.0  # times as fast as those beside it: rows may be uneven
 _STEPS = 2.0  # times what one step in acceleration within an interval explains: there may be several
 _MEANT, _MEANT_OF_ALL = 1e-3, 1e-4  # of the joint's peak, and of all: a column that differs by less is meant
 _AROUND = 32  # intervals on each side among which most disagree where a column of accelerations is wrong
@@ -86,7 +87,9 @@ class Changes:
         wrong, judged = (_around(flags) for flags in (disagree, moving))
         return np.asarray(disagree & (2 * wrong > np.maximum(judged, _FEWEST)))
 
-    def isolated(self, piece: NDArray[np.intp], joint: NDArray[np.intp], values: Array) -> NDArray[np.bool_]:
+    def isolated(
+        self, piece: NDArray[np.intp], joint: NDArray[np.intp], values: Array, times: float = _ISOLATED
+    ) -> NDArray[np.bool_]:
         """Return which of some values (P, n) are much larger than those near to them, but for one beside."""
         near = piece + np.arange(-_NEAR, _NEAR + 1)[:, None]
         inside = (near >= 0) & (near < len(values))
@@ -94,11 +97,11 @@ class Changes:
         sizes = np.abs(steps)
         own = sizes[_NEAR].copy()
         largest = (own > 0.0) & (own >= sizes.max(axis=0))
-        alone = np.sort(sizes, axis=0)[-3] * _ISOLATED <= own
+        alone = np.sort(sizes, axis=0)[-3] * times <= own
         if len(values) == 1 and self.stated is None:  # nothing says that it is no motion, and a fast one
             alone[:] = False
         if self.order == 0 and len(values) == 2:  # nothing else tells a jump from a motion that goes on
-            alone &= np.abs(steps.sum(axis=0)) * _ISOLATED <= own * (_ISOLATED + 1)
+            alone &= np.abs(steps.sum(axis=0)) * times <= own * (times + 1)
         return np.asarray(largest & alone)
 
 
@@ -204,7 +207,9 @@ class _Judge:
         changes = self.changes
         piece, joint = np.nonzero(persistent | jumping)
         row = piece + first
-        jumps = changes.isolated(row, joint, changes.change) & jumping[piece, joint]
+        per_time = changes.change / np.maximum(self.window.lengths, JUMP_ABSOLUTE)[:, None]
+        jumps = changes.isolated(row, joint, per_time, _FASTER) & jumping[piece, joint]
+        jumps &= changes.isolated(row, joint, changes.change)
         if changes.stated is not None:
             moved, said = (
                 np.abs(self._beside(values, row, joint)) for values in (changes.change, changes.stated)
