@@ -156,3 +156,17 @@ def test_rows_that_a_job_asks_for_its_consumer_are_recognised_where_that_is_name
     assert call(capfd, "plan", str(job), "-o", str(file)).code == 0
     outcome = call(capfd, "check", str(file), "--job", str(job), "--for", "ur-servoj", "--json")
     assert (outcome.code, json.loads(outcome.out)["planned_rows"]) == (0, True)
+
+
+def test_a_job_of_longer_periods_may_last_longer_than_the_rows_of_its_consumer(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """0.3 rad by a quintic at 1 rad/s at most: 15 / 8 * 0.3 = 0.5625 s, which is 0.564 s and 0.6 s in whole periods."""
+    job, file = tmp_path / "job.yaml", tmp_path / "rows.csv"
+    text = STEPPING.replace("trapezoid", "quintic").replace(", velocity: 0.5", "")
+    text = text.replace("acceleration: 4", "velocity: 1, acceleration: 40")
+    job.write_text(f"{text}output: {{rate: 10, align: true}}\n", encoding="utf-8")
+    planned(capfd, str(job), file, "--for", "ur-servoj")
+    assert len(file.read_text(encoding="utf-8").splitlines()) == 1 + 282 + 1
+    code, found = checked(capfd, str(job), file)
+    assert (code, found["planned_with"]) == (0, "--for ur-servoj")

@@ -112,11 +112,15 @@ def _consumers_by(ends: _Ends, plan: Plan) -> Iterator[RowsForConsumer]:
 
 
 def _fits(ends: _Ends, plan: Plan) -> bool:
-    """Return whether a file begins and ends where the motion does, and lasts longer, but not much."""
-    curve, duration = plan.trajectory.curve, plan.trajectory.duration
+    """Return whether a file begins and ends where the motion does, and lasts longer, but not much.
+
+    Where the job stretches moves to whole periods, those of a consumer may be shorter.
+    """
+    curve, duration, output = plan.trajectory.curve, plan.trajectory.duration, plan.loaded.job.output
+    shorter = len(plan.moves) / output.rate if output.align else -_LONGER
     begun = curve.evaluate(curve.start, 0)
     ended = curve.evaluate(curve.end, 0, side="left")
-    if ends.first.size != begun.size or not duration + _LONGER < ends.duration <= _LONGEST * duration:
+    if ends.first.size != begun.size or not duration - shorter < ends.duration <= _LONGEST * duration:
         return False
     off = np.maximum(np.abs(ends.first - begun), np.abs(ends.last - ended))
     return bool((off <= ends.slack + _OFF).all())
