@@ -411,6 +411,9 @@ def test_stretch_of_a_lift_in_closed_form():
     wanted = (8.0 + (64.0 + 80.0 * free) ** 0.5) / (2 * free)
     assert needed_stretch(survey, 0, 1, 60.0, 0.0).factor == pytest.approx(wanted, rel=1e-8)
     assert needed_stretch(survey, 0, 1, 200.0, 0.0).factor == 1.0
+    brake = np.array([-5 / 3, 1.0, -0.5, 0.0])[:, None, None]  # helped by friction, from 0.5 m/s down
+    survey = effort_survey(lift(0.05, Friction(0.0, 0.1)), np.array([0.0, 0.2]), brake)
+    assert needed_stretch(survey, 0, 1, 0.5105, 0.0).factor == pytest.approx(25 * 0.0105**0.5 - 1.25, 1e-4)
 
 
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
