@@ -52,6 +52,32 @@ def test_both_values_of_a_change_may_be_rounded(share: float, broken: bool, orde
     assert [each.kind for each in found] == (["derivative"] if broken else [])
 
 
+def of_points(motion: RecordedMotion, limits: Limits) -> list[tuple[str, str | None]]:
+    """Return kinds and quantities that are inconsistent of points, some of which lack velocities."""
+    judgement = judge_motion(lambda: [motion], Requirements(bare_robot(limits), interpolate="jtc"))
+    return [(f.kind, f.quantity) for f in judgement.findings if f.rule in ("continuity", "derivative")]
+
+
+@pytest.mark.parametrize("hole", [0, COUNT // 2, COUNT - 1])
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_point_without_a_rate_hides_nothing_of_the_others(order: int, hole: int) -> None:
+    """The column says twice what is true."""
+    columns = [np.sin(DENSE), np.cos(DENSE), -np.sin(DENSE)][: order + 1]
+    columns[order] = 2.0 * columns[order]
+    columns[order][hole] = np.nan
+    name = ("velocity", "acceleration")[order - 1]
+    assert of_points(rows(*columns, q=1e-12, qd=1e-12, qdd=1e-12), unlimited(1)) == [("derivative", name)]
+    columns[order] = columns[order] / 2.0
+    assert of_points(rows(*columns, q=1e-12, qd=1e-12, qdd=1e-12), unlimited(1)) == []
+
+
+def test_a_jump_beside_a_point_without_a_velocity_is_one() -> None:
+    q, qd = np.where(np.arange(COUNT) < COUNT // 2, 0.0, 1.0), np.zeros(COUNT)
+    qd[COUNT // 2] = np.nan
+    limits = replace(unlimited(1), velocity=np.array([[-2.0, 2.0]]))
+    assert of_points(rows(q, qd, q=1e-12, qd=1e-12), limits) == [("jump", "position")]
+
+
 @SIDES
 @pytest.mark.parametrize("order", [0, 1])
 @pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])

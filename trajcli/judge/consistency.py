@@ -126,7 +126,7 @@ def changes_of(window: Intervals) -> list[Changes]:
             padded = np.concatenate([bend[:1], bend, bend[-1:]])
             near = np.max([padded[k : k + len(change)] for k in range(4)], axis=0)
             slack = _STEPS * length ** (2 if order == 0 else 1) * near
-            largest = np.abs(rates).max(axis=0)
+            largest = np.nan_to_num(np.abs(rates)).max(axis=0)  # under `jtc` a row may state none
             meant = _MEANT * largest + _MEANT_OF_ALL * largest.max()
             slack = slack + 0.5 * length * (off[:-1] + off[1:]) + late * np.abs(mean) + length * meant
         found.append(Changes(order, change, error, stated, slack))
@@ -214,7 +214,7 @@ class _Judge:
             moved, said = (
                 np.abs(self._beside(values, row, joint)) for values in (changes.change, changes.stated)
             )
-            jumps &= moved >= said  # else it is the column of the derivative that jumps
+            jumps &= np.logical_not(moved < said)  # else it is the column of the derivative that jumps
         other = persistent[piece, joint] & ~jumps
         sizes = np.abs(changes.change[row, joint])
         branch = np.zeros(row.size, dtype=bool)
