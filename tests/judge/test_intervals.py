@@ -247,6 +247,22 @@ def test_a_change_of_law_explains_nothing_between_rows_that_are_further_apart_th
     assert np.isfinite(explained).tolist() == [True, True, False, False, False, True]
 
 
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("count", [2, 3, 400])
+@pytest.mark.parametrize("over", [0, 1, 2])
+def test_of_rows_that_are_held_the_last_one_is_judged_too(over: int, count: int, side: int) -> None:
+    """Nothing follows it. Of rows alike the first that is over the limit is named."""
+    t, q = 0.004 * np.arange(count), np.zeros(count)
+    over = min(over, count)
+    q[count - over :] = side * 1.5
+    exact = Resolution(0.0, *[np.zeros(1)] * 3)
+    rows = RecordedMotion(t, q[:, None], None, None, None, None, None, None, exact, "rows")
+    found = judged(rows, replace(unlimited(1), position=np.array([[-1.0, 1.0]])), interpolate="hold").findings
+    assert [(each.kind, each.value, each.row) for each in found] == [
+        ("position", side * 1.5, count - over + 1)
+    ] * (over > 0)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize(("share", "verdict"), [(0.99, "exceeded"), (1.01, "satisfied")])
 def test_a_spline_through_many_rows_is_that_of_all_of_them(order: int, share: float, verdict: str) -> None:

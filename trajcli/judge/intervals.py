@@ -79,10 +79,19 @@ class Intervals:
     @cached_property
     def hulls(self) -> tuple[tuple[Array, Array], ...]:
         """Least and largest control points (N - 1, n) of each derivative that some piece determines."""
+        if self.interpolation == "hold":
+            both = self.coefficients[0], self.behind
+            return ((np.minimum(*both), np.maximum(*both)),)
         lengths, highest = self.lengths[:, None], int(self.highest.max(initial=0))
         of_orders = (derivative_coefficients(self.coefficients, order) for order in range(highest + 1))
         points = (control_points(derivative, lengths) for derivative in of_orders)
         return tuple((of_order.min(axis=0), of_order.max(axis=0)) for of_order in points)
+
+    @cached_property
+    def behind(self) -> Array:
+        """Positions behind pieces that hold, but for the row that the next piece holds, (N - 1, n)."""
+        q = np.asarray(self.states[0])
+        return np.concatenate([q[:-2], q[-1:]]) if self.ends else q[:-1]
 
     @cached_property
     def jumps(self) -> tuple[Array, Array]:
