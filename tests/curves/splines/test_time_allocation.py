@@ -213,3 +213,14 @@ def test_dense_points_are_passed_when_a_law_through_some_of_them_says(slopes, mo
         assert durations.sum() == pytest.approx(np.ptp(u) * least)
     monkeypatch.setattr("trajcli.curves.splines.time_allocation.fastest_durations", lambda *_: None)
     assert dense.durations(np.diff(u)) is None
+
+
+@pytest.mark.parametrize("guess", [1.05, 1.1])
+def test_a_piece_between_moving_ends_keeps_its_limit_inside_too(guess):
+    """Over 1 from 0.9 to 0.9: in the middle the velocity is 1.5 / T - 0.45, which is 1 for T = 1.5 / 1.45.
+
+    With the ends moving it does not scale with the duration: from 1.1 in proportion to 0.914 it would be 1.04.
+    """
+    ends = ((1, np.array([0.9])), (1, np.array([0.9])))
+    found = fastest_durations(smooth(np.array([[0.0], [1.0]]), ends), np.array([guess]), bounds(velocity=1.0))
+    np.testing.assert_allclose(found, [1.5 / 1.45], rtol=1e-6)
