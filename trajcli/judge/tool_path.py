@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -90,7 +91,8 @@ class RecordedPath:
                 middle = horner(window.coefficients[:, inner], half[:, None])
                 warned = degree == 1 and not asked and 2.0 * half.max() <= DENSE
                 t, rows = window.t[inner] + half, window.rows[inner]
-                self._judge(middle, t, rows, slack[kept], (along, half), warned=warned)
+                slack = self._slack_between(inner, window)
+                self._judge(middle, t, rows, slack, (along, half), warned=warned)
 
     def see_between(self, window: Intervals, pieces: slice, since: Array) -> None:
         """Judge the middles of pieces that begin in places of the planned motion.
@@ -117,6 +119,14 @@ class RecordedPath:
         """Return by how much the tool may be off by the rounding of the rows, m and rad alike, (N,)."""
         off = stated_errors(q, *window.resolution.roundings[0])
         return np.asarray(2.0 * max(self._arm, 1.0) * off.sum(axis=1))
+
+    def _slack_between(self, pieces: NDArray[np.intp], window: Intervals) -> Array:
+        """Return the same of the curves between rows, which rounding of their rates moves, too, (m,)."""
+        off = np.empty(pieces.size)
+        for chosen, rows in window.rows_by_level(pieces):
+            error = replace(rows, late=np.zeros_like(rows.late)).error(0)
+            off[chosen] = error.reshape(chosen.size, -1).sum(axis=1)
+        return np.asarray(2.0 * max(self._arm, 1.0) * off)
 
     def _judge(
         self,
