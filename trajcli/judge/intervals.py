@@ -79,7 +79,7 @@ class Intervals:
     @cached_property
     def hulls(self) -> tuple[tuple[Array, Array], ...]:
         """Least and largest control points (N - 1, n) of each derivative that some piece determines."""
-        if self.interpolation == "hold":
+        if len(self.coefficients) == 1:  # rows are held
             both = self.coefficients[0], self.behind
             return ((np.minimum(*both), np.maximum(*both)),)
         lengths, highest = self.lengths[:, None], int(self.highest.max(initial=0))

@@ -159,7 +159,7 @@ class _Side:
         piece, joint = np.nonzero(over)
         chosen, length = polynomials[:, piece, joint], self.window.lengths[self.first + piece]
         start, end, bound = chosen[-1], horner(chosen, length), self.bound[joint]
-        if self.window.interpolation == "hold":
+        if len(self.window.coefficients) == 1:  # rows are held
             end = self.sign * self.window.behind[self.first + piece, joint]
         value, local = np.maximum(start, end), np.where(end > start, length, 0.0)
         if len(chosen) > 2:
