@@ -140,6 +140,7 @@ def test_states_in_json_lines_have_their_joints_by_name_and_the_time_of_their_st
     first = {**STATE, "header": {"stamp": {sec: 5, nanosec: 500_000_000}}}
     file = open_motion(written(tmp_path, lines(first, later), "a.jsonl"), joints=["a", "b"])
     np.testing.assert_array_equal(file.whole().t, [5.5, 6.25])
+    assert file.resolution.relative_time == 2.0**-53  # of seconds since 1970 that are 0.2 us
     np.testing.assert_array_equal(file.whole().q, [[0.1, 0.2]] * 2)
     with pytest.raises(InputError, match="there is no joint 'c'"):
         open_motion(written(tmp_path, lines(first, later), "a.jsonl"), joints=["a", "c"])
