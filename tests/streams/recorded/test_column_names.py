@@ -52,8 +52,20 @@ NAMES = {
     "wrist_1_joint": ("q", "wrist_1_joint", None, ""),
     "shoulder_pan.pos": ("q", "shoulder_pan", None, ""),
     "move": ("move", None, None, ""),
+    "q1/deg": ("q", 1, "deg", ""),  # as ISO 80000 heads columns of tables
+    "qd1/(deg/s)": ("qd", 1, "deg/s", ""),
+    "t/ms": ("t", None, "ms", ""),
+    "time/s": ("t", None, "s", ""),
+    "q1 in deg": ("q", 1, "deg", ""),
+    "velocity/s": ("qd", "s", None, ""),  # of a joint s
+    "t [\u00b5s]": ("t", None, "us", ""),  # the micro sign
+    "t [\u03bcs]": ("t", None, "us", ""),  # the Greek letter
+    "q1 [\u00ba]": ("q", 1, "deg", ""),  # an ordinal sign, which looks like a degree
+    "ms": ("t", None, "ms", ""),
+    "Seconds": ("t", None, "s", ""),
+    "current_joint_1": ("q", 1, None, "actual"),
 }
-OTHERS = ["x", "yaw", "position_x", "actual_TCP_pose_0", "tool_speed_1", "actual_current_0", "do_port", "", "1", "é", "description", "actual_joint_voltage_0"]  # fmt: skip
+OTHERS = ["x", "yaw", "position_x", "actual_TCP_pose_0", "tool_speed_1", "actual_current_0", "do_port", "s", "motor_1_current", "joint_2_current", "", "1", "é", "description", "actual_joint_voltage_0"]  # fmt: skip
 
 
 @pytest.mark.parametrize("text", NAMES)

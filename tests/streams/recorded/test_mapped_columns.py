@@ -21,6 +21,15 @@ def file_of(names: str, first: str = "") -> NamedFile:
     return NamedFile("in.csv", tuple(names.split(",")), lambda name: None, texts)
 
 
+@pytest.mark.parametrize(
+    ("names", "time"), [("secs,nsecs,time,q1", 2), ("q1,ms", 1), ("s,t,q1", 1), ("stamp_ns,ns,q1", 0)]
+)
+def test_a_column_called_as_its_unit_is_the_time_where_no_other_is(names: str, time: int) -> None:
+    assert assign_roles(file_of(names)).time == time
+    with pytest.raises(InputError, match="2 columns are times: sec, nanoseconds"):
+        assign_roles(file_of("sec,nanoseconds,q1"))
+
+
 def taken(names: str, found: ColumnRoles, quantity: str) -> str:
     return " ".join(names.split(",")[k] for k in found.joints[quantity])
 

@@ -73,20 +73,21 @@ _TIME_EXTRAS = frozenset(
 
 _BRACKETS = re.compile(r"\s*[\[({]\s*([^\])}]*?)\s*[\])}]\s*$")
 _SUFFIX = re.compile(
-    r"[_ ](deg|degs|degree|degrees|rad|rads|radian|radians|mm|millimeters?|m|meters?|metres?|nm|"
+    r"(?:[_ ]|(?<=[0-9])/|(?<=\bt)/|(?<=time)/)"
+    r"(deg|degs|degree|degrees|[°º˚]|rad|rads|radian|radians|mm|millimeters?|m|meters?|metres?|nm|"
     r"s|secs?|seconds?|ms|msecs?|millis|milliseconds?|us|usecs?|micros|microseconds?|ns|nsecs?|nanos|nanoseconds?)"
     r"((?:[_/]|_?per_?)(?:s|sec)(?:\^?[23]|²|³)?)?$",
     re.IGNORECASE,
 )
 _UNITS: dict[str, str] = {
-    **dict.fromkeys(("deg", "degs", "degree", "degrees", "°"), "deg"),
+    **dict.fromkeys(("deg", "degs", "degree", "degrees", "°", "º", "˚"), "deg"),
     **dict.fromkeys(("rad", "rads", "radian", "radians"), "rad"),
     **dict.fromkeys(("mm", "millimeter", "millimeters"), "mm"),
     **dict.fromkeys(("cm", "rev", "mrad", "um", "rpm", "min"), ""),
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), "m"),
     **dict.fromkeys(("s", "sec", "secs", "second", "seconds"), "s"),
     **dict.fromkeys(("ms", "msec", "msecs", "millis", "millisecond", "milliseconds"), "ms"),
-    **dict.fromkeys(("us", "µs", "usec", "usecs", "micros", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("us", "µs", "μs", "usec", "usecs", "micros", "microsecond", "microseconds"), "us"),
     **dict.fromkeys(("ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"), "ns"),
     **dict.fromkeys(("nm", "n m", "n*m", "n·m", "n.m", "n", "n-m"), "Nm"),
 }
@@ -124,13 +125,18 @@ def read_name(text: str) -> ColumnName:
     letters = [word for word in words if not word.isdigit()]
     if _is_time(words):
         return ColumnName(text, TIME, None, unit, "", plain)
+    if (
+        unit_of(text) in ("s", "ms", "us", "ns") and len(text.strip()) > 1
+    ):  # `s` alone is a length along a path
+        return ColumnName(text, TIME, None, unit_of(text), "", text)
     if words == [MOVE]:
         return ColumnName(text, MOVE, None, None, "", plain)
     quantity, others = _quantity(letters)
     kind = next((_KINDS[word] for word in others if word in _KINDS), "")
     numbers = list(re.finditer(r"[0-9]+", plain))
     if len(numbers) == 1 and all(word in _JOINT_WORDS | _KINDS.keys() | _EMPTY_WORDS for word in others):
-        quantity = "q" if quantity is None and _JOINT_WORDS & set(others) else quantity
+        if quantity is None and _JOINT_WORDS & set(others) and others[-1] != "current":  # in amperes
+            quantity = "q"
         at = numbers[0]
         ends = not plain[at.end() :].strip(" _.])}")
         stem = plain[: at.start()].rstrip(" _.[({") if ends else f"{plain[: at.start()]}*{plain[at.end() :]}"
@@ -144,13 +150,18 @@ def split_unit(text: str) -> tuple[str, str | None]:
     if match is not None:
         unit = unit_of(match[1])
         if unit is not None:
-            return text[: match.start()].rstrip(" _"), unit
+            return _without_in(text[: match.start()]), unit
     match = _SUFFIX.search(text)
     if match is not None and match.start() > 0:
         unit = unit_of(match[0][1:])
         if unit is not None:
-            return text[: match.start()], unit
+            return _without_in(text[: match.start()]), unit
     return text, None
+
+
+def _without_in(text: str) -> str:
+    """Return a name without the blanks, the stroke or the `in` before its unit."""
+    return text.rstrip(" _/").removesuffix(" in").rstrip()
 
 
 def unit_of(text: str) -> str | None:

@@ -333,6 +333,9 @@ class _Assignment:
         found = [index for index, read in enumerate(self._names) if read.quantity == TIME]
         if self._echo and len(found) > 1 and _STAMP in self._file.names:
             return self._stamp(found)
+        if len(found) > 1:  # one that is called as its unit is the time where nothing else is
+            units = [k for k in found if self._names[k].unit and self._names[k].stem == self._names[k].text]
+            found = [k for k in found if k not in units] or found
         if len(found) == 1:
             return found[0]
         names = [self._file.names[index] for index in found]
