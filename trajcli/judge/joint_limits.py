@@ -20,7 +20,7 @@ from trajcli.curves.piecewise import Array, derivative_coefficients, horner
 from trajcli.findings import Certainty, Collector, Finding, FindingSeverity
 from trajcli.frozen import frozen
 from trajcli.judge.intervals import Intervals, explained_by_law
-from trajcli.judge.rounding import PieceRows
+from trajcli.judge.rounding import PieceRows, stated_errors
 from trajcli.kinematics.robot import Robot
 from trajcli.limits.joints import joint_excess
 from trajcli.limits.kinds import JOINT_KINDS, KIND_OF
@@ -107,6 +107,8 @@ class JudgedRun:
 def judge_limits(run: JudgedRun) -> None:
     """Add where joints go beyond their limits in pieces with the same limits."""
     _judge_derivatives(run)
+    if run.window.states[2] is not None and run.window.interpolation == "linear" and not run.asked:
+        _judge_lone_accelerations(run, run.window.states[2])
     if KIND_OF["velocity_by_position"].stated(run.robot.limits):
         _judge_approaches(run)
 
@@ -132,6 +134,36 @@ def _judge_derivatives(run: JudgedRun) -> None:
                 offences = side.offences(derivative, alike, upper_bound) if order <= level else None
                 if offences is not None:
                     side.add(offences, run)
+
+
+def _judge_lone_accelerations(run: JudgedRun, stated: Array) -> None:
+    """Add accelerations of rows beyond their limits; without velocities beside them no curve has them."""
+    window, first, limits = run.window, run.pieces.start, run.robot.limits.acceleration
+    rows = slice(first, run.pieces.stop + (window.ends and run.pieces.stop == window.last))
+    off = stated_errors(stated, *window.resolution.roundings[2])
+    for sign, side in ((1.0, 1), (-1.0, 0)):
+        values, bounds = sign * stated[rows], sign * limits[:, side]
+        row, joint = np.nonzero(exceeds(values, bounds))
+        excess, at = (values - bounds)[row, joint], row + first
+        certain = excess > off[at, joint]
+        make = partial(_lone_acceleration, run, stated, off, at, joint, side)
+        used = values[row, joint] / bounds[joint]
+        run.add("acceleration", (at, joint), used, make, certain, np.zeros_like(certain))
+
+
+def _lone_acceleration(
+    run: JudgedRun,
+    stated: Array,
+    off: Array,
+    at: NDArray[np.intp],
+    joints: NDArray[np.intp],
+    side: int,
+    k: int,
+) -> Finding:
+    row, joint = int(at[k]), int(joints[k])
+    value, limit = float(stated[row, joint]), float(run.robot.limits.acceleration[joint, side])
+    found = joint_excess(run.robot, 2, joint, value, limit, float(run.window.t[row]))
+    return replace(found, row=int(run.window.rows[row]), rounding=float(off[row, joint]))
 
 
 @frozen
