@@ -65,7 +65,7 @@ NAMES = {
     "Seconds": ("t", None, "s", ""),
     "current_joint_1": ("q", 1, None, "actual"),
 }
-OTHERS = ["x", "yaw", "position_x", "actual_TCP_pose_0", "tool_speed_1", "actual_current_0", "do_port", "s", "motor_1_current", "joint_2_current", "", "1", "é", "description", "actual_joint_voltage_0"]  # fmt: skip
+OTHERS = ["x", "yaw", "position_x", "actual_TCP_pose_0", "tool_speed_1", "actual_current_0", "do_port", "s", "second", "motor_1_current", "joint_2_current", "", "1", "é", "description", "actual_joint_voltage_0"]  # fmt: skip
 
 
 @pytest.mark.parametrize("text", NAMES)

@@ -71,6 +71,8 @@ _TIME_EXTRAS = frozenset(
     ["from", "start", "since", "robot", "sim", "header", "field", "elapsed", "rel", "relative"]
 )
 
+_NO_TIMES = ("s", "second")  # a length along a path, and what comes behind the first
+
 _BRACKETS = re.compile(r"\s*[\[({]\s*([^\])}]*?)\s*[\])}]\s*$")
 _SUFFIX = re.compile(
     r"(?:[_ ]|(?<=[0-9])/|(?<=\bt)/|(?<=time)/)"
@@ -125,9 +127,7 @@ def read_name(text: str) -> ColumnName:
     letters = [word for word in words if not word.isdigit()]
     if _is_time(words):
         return ColumnName(text, TIME, None, unit, "", plain)
-    if (
-        unit_of(text) in ("s", "ms", "us", "ns") and len(text.strip()) > 1
-    ):  # `s` alone is a length along a path
+    if unit_of(text) in ("s", "ms", "us", "ns") and text.strip().lower() not in _NO_TIMES:
         return ColumnName(text, TIME, None, unit_of(text), "", text)
     if words == [MOVE]:
         return ColumnName(text, MOVE, None, None, "", plain)
