@@ -350,3 +350,28 @@ def test_what_decimals_excuse_is_said_where_the_new_file_has_no_such(
         assert remark not in found.err
         assert call(capfd, "check", "new.csv", "-r", "one.yaml").code == 0
     assert remark not in call(capfd, "convert", "rows.csv", "-o", f"new.{ending}").err  # of a plan
+
+
+def test_rows_that_number_the_joints_of_states_in_json_say_which_these_are(
+    folder: Path, capfd: Capture
+) -> None:
+    """Drivers name the joints in the order of the alphabet, and no column of a CSV does."""
+    rows = [
+        {
+            "header": {"stamp": {"sec": k, "nanosec": 0}},
+            "name": ["elbow", "base"],
+            "position": [k / 8, -k / 4],
+        }
+        for k in range(3)
+    ]
+    (folder / "states.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    found = call(capfd, "convert", "states.jsonl", "-o", "states.csv")
+    assert "columns number the joints: elbow, base" in found.err
+    np.testing.assert_array_equal(numbers("states.csv")[1][:, 1:], [[0, 0], [1 / 8, -1 / 4], [2 / 8, -2 / 4]])
+    (folder / "arm.yaml").write_text("joints: [{name: base}, {name: elbow}]\n")
+    found = call(capfd, "convert", "states.jsonl", "-r", "arm.yaml", "-o", "states.csv")
+    assert "columns number the joints: base, elbow" in found.err
+    np.testing.assert_array_equal(numbers("states.csv")[1][:, 1:], [[0, 0], [-1 / 4, 1 / 8], [-2 / 4, 2 / 8]])
+    found = call(capfd, "convert", "states.jsonl", "-o", "states.yaml")
+    assert "columns number" not in found.err
+    assert yaml.safe_load((folder / "states.yaml").read_text())["joint_names"] == ["elbow", "base"]

@@ -198,7 +198,7 @@ def _options(motion: EditedMotion, form: StreamFormat) -> tuple[WriteOptions, tu
 
 def _note_of_names(motion: EditedMotion) -> tuple[str, ...]:
     """Return that rows number the joints which a message names; nothing of other files."""
-    named = motion.format in ("ros", "mcap") and motion.rows.joints
+    named = motion.format in ("ros", "mcap", "jsonl") and motion.rows.joints
     return (f"columns number the joints: {', '.join(named)}",) if named else ()
 
 
