@@ -272,6 +272,22 @@ def test_the_extent_that_a_cut_names_can_be_cut(tmp_path: Path) -> None:
     np.testing.assert_array_equal(cut(read(file), 0.0, 6.851298016).rows.t, t)
 
 
+@pytest.mark.parametrize("decimals", [6, 9])
+@pytest.mark.parametrize("share", [0.5, 0.8])
+def test_a_row_between_rounded_rows_of_an_even_motion_does_not_jump(
+    decimals: int, share: float, tmp_path: Path
+) -> None:
+    """Quintics through rounded positions leave the straight line that their velocities say."""
+    t, file = np.arange(200) / 500, tmp_path / "rows.csv"
+    lines = [f"{a:.3f},{a / 7:.{decimals}f},{1 / 7:.{decimals}f},{0:.{decimals}f}\n" for a in t.tolist()]
+    file.write_text("t,q1,qd1,qdd1\n" + "".join(lines), encoding="utf-8")
+    motion = read(file)
+    for row in range(20, 30):
+        time = (row + share) / 500
+        assert new_jumps(motion, cut(motion, 0.0, time)) == []
+        assert new_jumps(motion, cut(motion, time, float(t[-1]))) == []
+
+
 def test_an_operation_that_makes_a_jump_is_noticed(tmp_path: Path) -> None:
     motion = read(planned(tmp_path / "rows.csv"))
     assert new_jumps(motion, motion) == []

@@ -237,6 +237,20 @@ def test_a_velocity_that_changes_evenly_over_uneven_rows_does_not_jump(
 
 
 @SIDES
+@pytest.mark.parametrize(
+    ("speed", "share", "jumps"), [(1.0, 0.9, False), (1.0, 1.1, True), (1e-3, 0.9, True)]
+)
+def test_a_velocity_may_be_off_by_what_rounded_positions_make_of_a_quintic(
+    speed: float, share: float, jumps: bool, side: int
+) -> None:
+    """15 / 8 of the difference of its ends over its length, and less than 1e-4 of the largest velocity."""
+    qd = np.full(COUNT, speed)
+    qd[12:] += side * share * 15 / 8 * 2 * 1e-9 / (DENSE[12] - DENSE[11])
+    motion = rows(speed * DENSE, qd, np.zeros(COUNT), q=1e-9)
+    assert [(each.kind, each.quantity) for each in inconsistent(motion)] == [("jump", "velocity")] * jumps
+
+
+@SIDES
 def test_rates_of_a_joint_that_rests_are_no_jump_of_its_position(side: int) -> None:
     qd = np.zeros(COUNT)
     qd[8:18] = side * 0.5

@@ -14,6 +14,7 @@ from trajcli.editing.edited_motion import EditedMotion
 from trajcli.errors import Amount, InputError, Problem, TrajcliError, VerificationError
 from trajcli.findings import Finding
 from trajcli.frozen import frozen
+from trajcli.judge.consistency import OF_ROUNDING
 from trajcli.judge.motion import Requirements, judge_motion
 from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
 from trajcli.units import Units, amount_text
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from trajcli.planning.plan import Plan
 
 _RULES = ("continuity", "time", "derivative")
+_QUANTITIES = ("position", "velocity", "acceleration")
 _SHARES = (0.0, 0.25, 0.5, 0.75)
 """Where a piece is compared; the error of a Hermite polynomial is largest about its middle."""
 
@@ -124,7 +126,11 @@ def refuse_new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMot
 def new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMotion) -> list[Problem]:
     """Return what is discontinuous about a motion, as it is written, and was not before, nor in `more`."""
     kinds = {_kind(finding) for each in (before, *more) for finding in _jumps(each)}
-    found = [finding for finding in _jumps(after.as_written()) if _kind(finding) not in kinds]
+    found = [
+        finding
+        for finding in _jumps(after.as_written())
+        if _kind(finding) not in kinds and not _is_rounding(finding, before)
+    ]
     return [finding.problem(f"{before.rows.source}: {finding.text()}") for finding in found]
 
 
@@ -141,6 +147,18 @@ def no_longer_excused(motion: EditedMotion, read: EditedMotion) -> tuple[str, ..
     more = f", and {len(found) - 1} more" if len(found) > 1 else ""
     text = "`check` may find what the decimals of this file excuse, and those of the new one do not"
     return (f"{text}: {found[0].text()}{more}",) if found else ()
+
+
+def _is_rounding(finding: Finding, before: EditedMotion) -> bool:
+    """Return whether a row between those of a file is off by what the rounding of their positions makes."""
+    if finding.quantity is None or finding.joint is None or finding.time is None or finding.value is None:
+        return False
+    rows, order = before.rows, _QUANTITIES.index(finding.quantity)
+    after = min(max(int(np.searchsorted(rows.t, finding.time, side="right")), 1), rows.t.size - 1)
+    length = float(rows.t[after] - rows.t[after - 1])
+    off = float(rows.resolution.q[before.joint_names.index(finding.joint)])
+    missed = abs(finding.value - (finding.limit or 0.0))
+    return length > 0 and missed <= finding.rounding + OF_ROUNDING[order] * off / length**order
 
 
 def _kind(finding: Finding) -> tuple[str, str | None, str | None]:

@@ -29,6 +29,8 @@ _STEPS = 2.0  # times what one step in acceleration within an interval explains:
 _MEANT, _MEANT_OF_ALL = 1e-3, 1e-4  # of the joint's peak, and of all: a column that differs by less is meant
 _AROUND = 32  # intervals on each side among which most disagree where a column of accelerations is wrong
 _FEWEST = 8  # of them that are counted, also where there are fewer
+OF_ROUNDING = (0.0, 15 / 4, 20 / 3**0.5)
+"""Times e / h^order: what a quintic of length h, off by e at both ends, makes of rows that are on it."""
 _NEAR = 2  # intervals on each side that a jump is compared with
 _QUANTITIES = ("position", "velocity", "acceleration")
 
@@ -109,12 +111,15 @@ def changes_of(window: Intervals) -> list[Changes]:
     """Return how positions, velocities and accelerations change, as far as the rows have them."""
     states = window.states
     roundings, length, late = window.resolution.roundings, window.lengths[:, None], window.late[:, None]
-    found = []
+    found, positions = [], np.zeros(0)
     for order, values in enumerate(states):
         if values is None:
             continue
         off = stated_errors(values, *roundings[order])
         change, error = np.diff(values, axis=0), off[:-1] + off[1:]
+        positions = off if order == 0 else positions
+        made = OF_ROUNDING[order] * np.maximum(positions[:-1], positions[1:]) / length**order
+        error = error + np.minimum(made, _MEANT_OF_ALL * np.abs(values).max(axis=0))
         stated = slack = None
         rates = states[order + 1] if order < 2 else None
         if rates is not None:
