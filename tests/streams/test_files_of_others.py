@@ -144,6 +144,14 @@ def test_states_in_json_lines_have_their_joints_by_name_and_the_time_of_their_st
     np.testing.assert_array_equal(file.whole().q, [[0.1, 0.2]] * 2)
     with pytest.raises(InputError, match="there is no joint 'c'"):
         open_motion(written(tmp_path, lines(first, later), "a.jsonl"), joints=["a", "c"])
+    table = read_table(tmp_path / "a.jsonl", joints=["a", "b"])  # as pages and pictures read it
+    assert (table.names, table.joints) == (("t", "q1", "q2"), ("a", "b"))
+    np.testing.assert_array_equal(table.columns, [[5.5, 0.1, 0.2], [6.25, 0.1, 0.2]])
+    moving = [{**row, "velocity": [2.0, 1.0], "effort": []} for row in (first, later)]
+    np.testing.assert_array_equal(
+        open_motion(written(tmp_path, lines(*moving), "a.jsonl"), joints=["a", "b"]).whole().qd,
+        [[1.0, 2.0]] * 2,
+    )
 
 
 def test_rows_whose_names_of_joints_change_are_refused(tmp_path: Path) -> None:

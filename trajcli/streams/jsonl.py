@@ -27,7 +27,7 @@ _BLOCK = 4096  # rows gathered at a time
 _LONGEST = 1 << 24  # bytes of a line
 _LARGEST_NUMBER = 1e300
 _SHOWN = 200  # characters of a line in a message
-_SECONDS = "header.stamp"
+_OF_STATES = {"position": "q", "velocity": "qd", "effort": "tau"}
 
 
 def _value(field: RowField, row: list[float]) -> Any:  # noqa: ANN401
@@ -124,12 +124,11 @@ class JsonRows(RowSource):
         self._width = len(names)
         self._joints = _joints_of(value, self._columns.values())
         self.joint_names = None if self._joints is None else tuple(self._joints)
-        self.si = _SECONDS in value
         unread = [key for key in value if key not in self._columns and value[key] != (self._joints or value)]
         self.notes = (f"keys that are not read: {', '.join(unread)}",) if unread else ()
         place = Place(file, first, 1, line[:_SHOWN].decode("utf-8", "replace").rstrip())
         self.named = NamedFile(file, tuple(names), lambda name: place)
-        self.relative = np.array([2.0**-53 * (name == _SECONDS) for name in names])  # a sum of two numbers
+        self.relative = np.array([2.0**-53 * (name == "t" and self._joints is not None) for name in names])
         self._decimals = np.zeros(self._width, np.int64)
 
     def blocks(self, taken: Sequence[int], fixed: Sequence[int]) -> Iterator[Array]:
@@ -197,7 +196,7 @@ def _object(line: bytes, file: str, number: int) -> dict[str, Any]:
 
 
 def _with_seconds(value: dict[str, Any]) -> dict[str, Any]:
-    """Return a message of ROS with the stamp of its header as a time; any other object as it is."""
+    """Return a message of ROS by our names, with its stamp as a time; any other object as it is."""
     header = value.get("header")
     stamp = header.get("stamp") if isinstance(header, dict) else None
     if not isinstance(stamp, dict):
@@ -205,8 +204,8 @@ def _with_seconds(value: dict[str, Any]) -> dict[str, Any]:
     seconds, nanoseconds = stamp.get("sec", stamp.get("secs")), stamp.get("nanosec", stamp.get("nsecs"))
     if type(seconds) is not int or type(nanoseconds) is not int:
         return value
-    others = {key: content for key, content in value.items() if key != "header"}
-    return {_SECONDS: seconds + nanoseconds / 1e9, **others}
+    held = {key: content for key, content in value.items() if key != "header" and content != []}
+    return {"t": seconds + nanoseconds / 1e9, **{_OF_STATES.get(key, key): held[key] for key in held}}
 
 
 def _joints_of(value: dict[str, Any], lengths: Iterable[int | None]) -> list[str] | None:
