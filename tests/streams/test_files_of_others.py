@@ -71,6 +71,16 @@ def test_what_is_wrong_with_names_is_said_with_its_place(
     assert (place.line, place.column) == (line, column)
 
 
+@pytest.mark.parametrize("units", ["s,deg,deg", '"s","deg","deg"', "[s],[deg],[deg]", "(ms),rad,rad"])
+def test_a_line_of_units_is_told_from_other_texts(units: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected a finite number") as caught:
+        read_table(written(tmp_path, f"t,q1,q2\n{units}\n{PLAIN}"))
+    assert "a line of units is not read" in caught.value.problems[0].advice()
+    with pytest.raises(InputError, match="expected a finite number") as caught:
+        read_table(written(tmp_path, f"t,q1,q2\nstart,0,0\n{PLAIN}"))
+    assert caught.value.problems[0].advice() is None
+
+
 def test_a_name_in_quotes_is_shown_where_it_stands(tmp_path: Path) -> None:
     text = 't,"the joint 1, left [furlong]","joint 2, left [rad]"\n' + PLAIN
     columns = {"t": "t", "q1": "the joint 1, left [furlong]", "q2": "joint 2, left [rad]"}

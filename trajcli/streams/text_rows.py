@@ -14,11 +14,13 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place, Problem
 from trajcli.streams.decimals import NotFixedError, scan_fixed
 from trajcli.streams.number_cells import decimals_of, scan_decimals
+from trajcli.streams.recorded.column_names import unit_of
 from trajcli.streams.text_layout import LONGEST_LINE, Header, RowLayout, is_number, layout_of
 
 _SHOWN = 40  # characters of a cell, and
 _SHOWN_LINE = 200  # of a line, in a message
 _QUOTED = re.compile(rb'"[^"]*"')
+_UNITS = "a line of units is not read: leave it out, and say them by --units, or in the names: q1_deg"
 _CUT = "the file ends in the middle of a line: it may have been cut"
 
 
@@ -205,7 +207,8 @@ class RowReader:
                 shown = cell.strip() if len(cell) <= _SHOWN else cell.strip()[:_SHOWN] + "..."
                 place = Place(self._header.file, number, column, _shown_line(line), max(len(cell), 1))
                 value = f"'{shown}'" if shown else "empty"
-                return f"{names[index]} is {value}, expected a finite number", None, place
+                hint = _UNITS if unit_of(cell.strip(' "[]()')) else None
+                return f"{names[index]} is {value}, expected a finite number", hint, place
         return None
 
 
