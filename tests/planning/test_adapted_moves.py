@@ -155,3 +155,16 @@ def test_breaks_on_rows_are_asked_for_as_late_as_all_limits_need(monkeypatch: py
     assert asked == pytest.approx([1.0, 1.44, 1.92, 2.4, 2.5])
     assert made.duration == pytest.approx(2.8)
     assert made.planned.events == said
+
+
+def test_rounds_of_one_motion_are_adapted_each_by_itself() -> None:
+    there, back = ({"planner": "quintic", "to": {"joints": [q]}, "duration": 1} for q in (1, 0))
+    job = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0]}, "when_over_limit": "slow"}
+    loaded = job_from_text(json.dumps({**job, "moves": [{"repeat": 2, "moves": [there, back]}]}))
+    for stretches, expected in (
+        ({0: 2.0, 3: 1.5}, [2, 1, 1, 1.5]),
+        ({2: 3.0}, [1, 1, 3, 1]),
+        ({}, [1, 1, 1, 1]),
+    ):
+        made = plan_job(loaded, adapted=Adaptation(stretches=stretches))
+        assert [move.duration for move in made.moves] == pytest.approx(expected)
