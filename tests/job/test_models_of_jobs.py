@@ -270,3 +270,34 @@ def test_the_advice_about_columns_of_signals_that_none_sets_works() -> None:
 def test_a_word_for_what_is_over_its_limit_is_one_of_two() -> None:
     assert job(more="when_over_limit: slow").job.when_over_limit == "slow"
     refused("expected error or slow", more="when_over_limit: stop")
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("robt", "robot"),
+        ("strat", "start"),
+        ("move", "moves"),
+        ("sequence", "sequences"),
+        ("default", "defaults"),
+        ("frame_s", "frames"),
+    ],
+)
+def test_a_section_that_is_mistyped_is_told_once_with_the_name_that_is_meant(
+    written: str, meant: str
+) -> None:
+    """One that every job needs is not told to be missing as well."""
+    text = f"version: 1\nrobot: ur5e\nstart: {{joints: 0}}\nmoves: [{HOLD}]\n"
+    typed = text.replace(f"{meant}:", f"{written}:") if f"{meant}:" in text else f"{text}{written}: {{}}\n"
+    with pytest.raises(InputError) as caught:
+        job_from_text(typed)
+    (problem,) = caught.value.problems
+    assert (problem.message, problem.hint) == (f"unknown key '{written}'", f"did you mean '{meant}'?")
+
+
+def test_a_section_that_does_not_exist_is_told_with_all_that_do() -> None:
+    with pytest.raises(InputError) as caught:
+        job(more="xyz: 3")
+    named = (caught.value.problems[0].hint or "").partition(": ")[2].split(", ")
+    assert {"sequences", "defaults", "points", "output"} <= {*named}
+    assert not [name for name in named if "\0" in name]

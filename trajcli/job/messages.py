@@ -52,6 +52,7 @@ _LAW_FIELDS = {
 }
 """Words that stand beside `to` in other programs, with the field of the law that is meant."""
 _KEYS_ELSEWHERE = {
+    "move": "moves",
     "target": "to",
     "goal": "to",
     "end": "to",
@@ -170,7 +171,7 @@ def _flaws(
         return [(path, f"unknown key '{abridged(key)}'", hint, True)]
     if kind == "missing":
         name = str(loc[-1])
-        if _meant_by_others(name, document.node(path[:-1])):
+        if _meant_by_another(name, _field_names(model, loc[:-1]), document.node(path[:-1])):
             return []  # the key that stands for it is unknown, and says so
         field = _model_at(model, loc[:-1]).model_fields[name]
         return [(path, f"`{name}` is missing", _described(field), False)]
@@ -227,10 +228,10 @@ def _other_key(key: str, names: Sequence[str]) -> str | None:
     return did_you_mean(key, names) if elsewhere is None else elsewhere.format(value="...")
 
 
-def _meant_by_others(name: str, node: Node | None) -> bool:
+def _meant_by_another(name: str, names: Sequence[str], node: Node | None) -> bool:
     """Return whether a mapping has a key that stands for one that is missing."""
     keys = node.value if node is not None and isinstance(node.value, dict) else {}
-    return any(_KEYS_ELSEWHERE.get(key.casefold()) == name for key in keys)
+    return any(key not in names and _other_key(key, names) == f"did you mean '{name}'?" for key in keys)
 
 
 def _every_planner() -> str:
@@ -331,7 +332,7 @@ def _path_in_file(loc: FieldPath, document: Document, prefix: FieldPath) -> Fiel
 def _field_names(model: type[BaseModel], loc: FieldPath) -> list[str]:
     """Return the keys that may stand at `loc`, read off the model."""
     fields = _model_at(model, loc).model_fields
-    return [field.alias or name for name, field in fields.items() if not field.exclude]
+    return [field.alias or name for name, field in fields.items() if field.description or not field.exclude]
 
 
 def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:

@@ -372,9 +372,12 @@ def test_wrong_points_are_refused(point: str, message: str) -> None:
 def test_a_flaw_in_a_move_that_is_repeated_is_said_once_and_names_the_round_when_it_plans() -> None:
     with pytest.raises(InputError) as caught:
         job_from_text(HEAD + PALLET.replace("duration: 0.5", "duratio: 0.5"), "job.yaml")
+    assert [problem.message for problem in caught.value.problems] == ["unknown key 'duratio'"]
+    with pytest.raises(InputError) as caught:
+        job_from_text(HEAD + PALLET.replace("duration: 0.5", "comment: 0.5"), "job.yaml")
     assert [problem.message for problem in caught.value.problems] == [
         "`duration` is missing",
-        "unknown key 'duratio'",
+        "unknown key 'comment'",
     ]
     far = PALLET.replace("xyz: [80, 0, 5]", "xyz: [800, 0, 0]")
     with pytest.raises(
