@@ -301,3 +301,63 @@ def test_a_section_that_does_not_exist_is_told_with_all_that_do() -> None:
     named = (caught.value.problems[0].hint or "").partition(": ")[2].split(", ")
     assert {"sequences", "defaults", "points", "output"} <= {*named}
     assert not [name for name in named if "\0" in name]
+
+
+LACKING = [  # a state or a move with a key that is mistyped, the key, and the hint
+    ("{form: a, offset: {xyz: [0, 0, 1]}, frame: world}", "form", "did you mean 'from'?"),
+    ("{fom: a}", "fom", "did you mean 'from'?"),
+    ("{xyz: [1, 2, 3], frame: world}", "frame", "frames stand under `frames` of the job, and a pose in one says `in: NAME`"),
+    (
+        "{offset: {xyz: [0, 0, 1]}, joints: 0}",
+        "offset",
+        "a state says how far from a point: `{from: NAME, offset: ...}`, or `from: here`",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("state", "key", "hint"), LACKING)
+def test_a_key_that_is_mistyped_makes_no_other_of_a_relative_state_wrong(
+    state: str, key: str, hint: str
+) -> None:
+    points = f"points: {{a: {{joints: 0}}, b: {state}}}"
+    with pytest.raises(InputError) as caught:
+        job(more=points, robot="ur5e")
+    (problem,) = caught.value.problems
+    assert (problem.message, problem.hint) == (f"unknown key '{key}'", hint)
+
+
+@pytest.mark.parametrize(
+    ("move", "key", "hint"),
+    [
+        (LINE, "aproach", "did you mean 'approach'?"),
+        (LINE, "retraet", "did you mean 'retreat'?"),
+        (HOLD, "retraet", "did you mean 'retreat'?"),
+        (HOLD, "approach", None),
+        ("{detach: {}}", "aproach", None),
+    ],
+)
+def test_what_a_move_may_have_before_and_behind_it_can_be_meant(
+    move: str, key: str, hint: str | None
+) -> None:
+    start = "{joints: [0, -1.5, 1.5, 0, 1.5, 0]}"
+    wrong = (
+        f"{move[: move.rindex('}')]}, {key}: 0.1}}" if "detach" not in move else f"{{detach: {{{key}: 1}}}}"
+    )
+    with pytest.raises(InputError) as caught:
+        job(wrong, robot="ur5e", start=start)
+    (problem,) = caught.value.problems
+    assert key in problem.message
+    if hint is not None:
+        assert problem.hint == hint
+    assert "'approach'?" not in (problem.hint or "") or hint
+
+
+@pytest.mark.parametrize("kind", ["type: prismtic", "tpye: prismatic", "tpe: prismatc"])
+def test_a_type_that_is_mistyped_makes_no_number_of_its_joint_wrong(kind: str) -> None:
+    robot = f"{{joints: [{{{kind}, position: [0 mm, 5 mm], velocity: 50 cm/s, effort: 3 N}}, {{}}]}}"
+    line, _ = refused("", robot=robot)
+    assert line == 2
+    turning = robot.replace(kind, "type: revolut")
+    with pytest.raises(InputError) as caught:
+        job(robot=turning)
+    assert len(caught.value.problems) == 4, "of a joint that turns they are wrong, too"

@@ -17,9 +17,11 @@ from trajcli.job.yaml.document import Node
 from trajcli.job.yaml.load import Document
 from trajcli.language.limits import LimitsSpec
 from trajcli.language.numbers import AT_KEY, FieldPath, Flaw, FlawError, ReadingContext, shown
+from trajcli.language.points import RELATIVE_FIELDS
 from trajcli.language.poses import read_rows
+from trajcli.language.targets import Target
 from trajcli.planners import ALSO_CALLED, HANDLING, PLANNERS, defaults_of_paths
-from trajcli.planners.planner import Event
+from trajcli.planners.planner import Event, Planner
 from trajcli.suggest import abridged, did_you_mean, valid_names
 
 M = TypeVar("M", bound=BaseModel)
@@ -109,6 +111,7 @@ _NOT_HERE = {
         ("frame", "wobj", "workobject", "uframe"),
         "frames stand under `frames` of the job, and a pose in one says `in: NAME`",
     ),
+    "offset": "a state says how far from a point: `{{from: NAME, offset: ...}}`, or `from: here`",
 }
 """Sections of other programs, with what says the same."""
 _TIMES = ("times", "knots", "time_stamps", "timestamps")
@@ -167,6 +170,8 @@ def _flaws(
     if kind == "extra_forbidden":
         names = _field_names(model, loc[:-1])
         key = str(path[-1])
+        if key in RELATIVE_FIELDS and _meant_by_another("from", names, document.node(path[:-1])):
+            return []  # they are right beside the key that is meant
         hint = _other_place(path, names, document) or _other_key(key, names) or valid_names(names)
         return [(path, f"unknown key '{abridged(key)}'", hint, True)]
     if kind == "missing":
@@ -331,8 +336,12 @@ def _path_in_file(loc: FieldPath, document: Document, prefix: FieldPath) -> Fiel
 
 def _field_names(model: type[BaseModel], loc: FieldPath) -> list[str]:
     """Return the keys that may stand at `loc`, read off the model."""
-    fields = _model_at(model, loc).model_fields
-    return [field.alias or name for name, field in fields.items() if field.description or not field.exclude]
+    at = _model_at(model, loc)
+    fields = at.model_fields.items()
+    names = [field.alias or name for name, field in fields if field.description or not field.exclude]
+    if issubclass(at, Planner) and "planner" in names:
+        return [*names, *(["approach"] if "to" in names else []), "retreat"]
+    return [*names, "from"] if issubclass(at, Target) else names
 
 
 def _model_at(model: type[BaseModel], loc: FieldPath) -> type[BaseModel]:

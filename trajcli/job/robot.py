@@ -40,6 +40,7 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.per_joint import UNLIMITED, LowerUpper
 from trajcli.language.poses import Pose
+from trajcli.suggest import nearest
 from trajcli.units import Quantity, Units, units_of
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ M = TypeVar("M", bound=Model)
 
 _URDF_ENDINGS = (".urdf", ".xacro", ".xml")
 _ANGLE, _LENGTH = Quantity("angle"), Quantity("length")
+_TYPES = ("revolute", "prismatic")
 DH_ROW = {"theta": _ANGLE, "d": _LENGTH, "a": _LENGTH, "alpha": _ANGLE, "beta": _ANGLE}
 
 
@@ -99,9 +101,12 @@ class JointModel(Model):
     @model_validator(mode="before")
     @classmethod
     def _announce_type(cls, data: Any, info: ValidationInfo) -> Any:  # noqa: ANN401
-        # the units of the limits depend on the type, which stands beside them
+        # the units of the limits depend on the type, which stands beside them, perhaps mistyped
         if isinstance(info.context, ReadingContext) and isinstance(data, dict):
-            info.context.joint_types = (str(data.get("type", "revolute")),)
+            unknown = [str(key) for key in data if key not in cls.model_fields]
+            key = nearest("type", unknown) if unknown and "type" not in data else "type"
+            given = data.get(key, _TYPES[0])
+            info.context.joint_types = (given if given in _TYPES else nearest(str(given), _TYPES) or "",)
         return data
 
 
@@ -278,8 +283,6 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
                 Problem("a robot inside a job uses the job's units", "leave `units` out here", place)
             )
         if "joints" not in value:
-            from trajcli.suggest import nearest
-
             near = nearest(key, ["file", "urdf", *RobotModel.model_fields])
             if near in ("file", "urdf"):
                 raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
