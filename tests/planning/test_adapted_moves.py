@@ -168,3 +168,28 @@ def test_rounds_of_one_motion_are_adapted_each_by_itself() -> None:
     ):
         made = plan_job(loaded, adapted=Adaptation(stretches=stretches))
         assert [move.duration for move in made.moves] == pytest.approx(expected)
+
+
+def test_what_is_tightened_says_nothing_of_the_fastest_motion() -> None:
+    job = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0]}, "when_over_limit": "slow"}
+    limits = {"velocity": 1, "acceleration": 2}
+    move = {"planner": "time_optimal", "through": [{"joints": [1]}], "to": {"joints": [2]}}
+    loaded = job_from_text(json.dumps({**job, "limits": limits, "moves": [move]}))
+    plain, capped = (
+        plan_job(loaded, adapted=Adaptation(caps)).moves[0] for caps in ({}, {(0, "velocity", 0): 0.5})
+    )
+    assert (plain.planned.binding_phases, capped.planned.binding_phases) == (True, False)
+    assert capped.planned.curve.evaluate(capped.duration / 2, 1) == pytest.approx(0.5)
+    assert capped.robot.limits.velocity.tolist() == [[-1, 1]]
+
+
+def test_moves_of_whole_periods_are_planned_anew_for_other_rows() -> None:
+    job = {"version": 1, "robot": {"joints": 1}, "start": {"joints": [0]}, "limits": {"velocity": 1}}
+    move = {"planner": "quintic", "to": {"joints": [1]}, "duration": 3.456}
+    adapted = Adaptation()
+    for rate in (10, 4, 1):
+        output = {"rate": rate, "align": True}
+        made = plan_job(
+            job_from_text(json.dumps({**job, "output": output, "moves": [move]})), adapted=adapted
+        )
+        assert made.moves[0].duration * rate == pytest.approx(np.ceil(3.456 * rate))

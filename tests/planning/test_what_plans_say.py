@@ -323,3 +323,45 @@ def test_a_limit_that_a_later_move_loosens_is_named_where_it_stands() -> None:
     text = json.dumps(job_of(*moves, limits={"velocity": 3}))
     assert problem.move == 1
     assert text.index('"velocity": 9') - 20 < problem.place.column <= text.index('"velocity": 9') + 15
+
+
+def test_an_arm_that_stands_does_not_begin_with_an_acceleration() -> None:
+    """Not even with a small one; one that a move takes up is no flaw."""
+    for acceleration in (5.0, 1e-4):
+        start = {"joints": [0, 0], "acceleration": [0, acceleration]}
+        with pytest.raises(InputError, match="hold cannot start with an acceleration"):
+            planned({"planner": "hold", "duration": 1}, start=start)
+        quintic = {"planner": "quintic", "to": {"joints": [1, 1]}, "duration": 2}
+        taken = planned(quintic, start=start).trajectory.start.acceleration
+        assert taken.tolist() == [0, acceleration]
+
+
+ARM = {"version": 1, "robot": "ur5e", "start": {"joints": [0, -1.5, 1.5, 0, 1.5, 0]}}
+FAR = {"planner": "line", "to": {"xyz": [9, 9, 9]}}
+
+
+def test_what_limits_lack_is_said_before_what_no_arm_reaches() -> None:
+    with pytest.raises(MissingLimitError) as caught:
+        plan_job(loaded({**ARM, "moves": [FAR, FAR]}))
+    assert [problem.move for problem in caught.value.problems] == [0]
+
+
+def test_a_start_that_no_arm_reaches_is_told_where_it_stands() -> None:
+    text = "version: 1\nrobot: ur5e\nstart: {xyz: [9, 9, 9]}\nmoves: [{planner: hold, duration: 1}]\n"
+    with pytest.raises(PlanningError, match="cannot reach the pose") as caught:
+        plan_job(job_from_text(text))
+    assert str(caught.value.problems[0].place).endswith(":3:8")
+
+
+def test_a_pose_is_said_to_be_reached_where_the_last_point_of_a_move_is_one() -> None:
+    """Poses on the way there are none that the move goes to; the start's branch is the one that is nearest to zero."""
+    joints = {"joints": [0, -1.5, 1.5, 0, 1.5, 0], "time": 2}
+    pose = {"xyz": [0.5, 0.15, 0.5], "rpy": [3, 0, 1], "configuration": {"elbow": "up"}, "time": 1}
+    first, last = {**pose, "time": 1}, {**pose, "time": 2}
+    spline = {"planner": "spline"}
+    ends = plan_job(loaded({**ARM, "moves": [{**spline, "through": [first], "to": joints}]}))
+    poses = plan_job(loaded({**ARM, "moves": [{**spline, "through": [{**joints, "time": 1}], "to": last}]}))
+    assert (0 in ends.poses, 0 in poses.poses) == (False, True)
+    begun = {key: pose[key] for key in ("xyz", "rpy")}
+    starts = plan_job(loaded({**ARM, "start": begun, "moves": [{"planner": "hold", "duration": 1}]}))
+    assert starts.poses[None].near.tolist() == [0] * 6
