@@ -261,3 +261,37 @@ def test_along_a_line_each_joint_is_excused_up_to_where_the_start_leads_it(accel
     for each, share in zip(found, joints, strict=True):
         reached = sorted([0.5 * share, (0.5 + acceleration**2 / (2 * 4.0)) * share])
         assert [each.lowest, each.highest] == pytest.approx(reached, rel=1e-12)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("how", ["each", "line"])
+@pytest.mark.parametrize("late", [0.0, 0.01])
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_takes_no_time_before_a_move_that_brakes_is_excused_as_its_start_is(count, late, how, side):
+    """A signal, or another tool: there are the velocity and the acceleration of the start, and no others."""
+    brakes = [(0.5, -4.0 * side), (0.75, 0.0), (0.5, 4.0 * side)]
+    whole = _motion(3.0 * side, 0.0, [*([(late, 0.0)] if late else []), *brakes])
+    before = tuple(Span(k, "signal", 0.0, 0.0, 2) for k in range(count))
+    whole = replace(whole, spans=(*before, Span(count, "jerk_limited", 0.0, whole.curve.duration, 2)))
+    limits, still = [_limits()] * (count + 1), [Promise()] * count
+    found = verify(whole, limits, [*still, Promise(braking=how)]).findings
+    assert [(each.move, each.kind) for each in found] == ([(count, "velocity")] if late else [])
+    unexcused = verify(whole, limits, [*still, Promise()]).findings
+    assert {each.move for each in unexcused} == {*range(count + 1)}
+    elsewhere = replace(_limits(), position=np.array([[-9.0, 9.0], [-1.0, 2.0]]))
+    shifted = whole.curve.coefficients.copy()
+    shifted[-1, :, 1] += 3.0
+    moved = replace(whole, curve=PiecewisePolynomial(whole.curve.breaks, shifted))
+    found = verify(moved, [elsewhere, *limits[1:]], [*still, Promise(braking=how)]).findings
+    assert [(each.move, each.joint, each.kind) for each in found][:1] == [(0, "b", "position")]
+
+
+def test_what_moves_before_a_move_that_brakes_is_excused_nothing():
+    """From 0.5 to 3 rad/s within limits of 2 rad/s, and back within 1 rad/s."""
+    faster, brakes = [(0.5, 4.0), (0.75, 0.0), (0.5, -4.0)], [(0.5, -4.0), (0.75, 0.0), (0.5, 4.0)]
+    both = _motion(0.5, 0.0, [*faster, *brakes])
+    times = [(0.0, 1.75), (1.75, 1.75), (1.75, both.curve.duration)]
+    spans = tuple(Span(k, "jerk_limited", start, end, 2) for k, (start, end) in enumerate(times))
+    promises = [Promise(), Promise(), Promise(braking="each")]
+    found = verify(replace(both, spans=spans), [_limits(velocity=2.0), *[_limits()] * 2], promises).findings
+    assert [(each.move, each.kind) for each in found] == [(0, "velocity")]

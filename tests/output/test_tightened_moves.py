@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from trajcli.errors import VerificationError
 from trajcli.findings import Finding
 from trajcli.job.read import job_from_text
-from trajcli.output.delivery.slower_motion import may_be_cured, tightened
+from trajcli.output.delivery.slower_motion import may_be_cured, refuse_braking, tightened
 from trajcli.planning.adaptation import Adaptation
 from trajcli.planning.plan import Plan, plan_job
 
@@ -139,3 +140,34 @@ def test_what_no_slowness_cures_is_left() -> None:
     assert [may_be_cured(one) for one in hopeless] == [True, True, True, False]
     assert tightened(planned("error"), (), [(1.1, 1, 0, 0)], Adaptation()) is None
     assert tightened(planned(), (), (), Adaptation()) is None
+
+
+@pytest.mark.parametrize(
+    ("start", "used", "kind", "joint"),
+    [
+        ({"velocity": [0.5, -3]}, "150 % of the velocity", "velocity", "b"),
+        ({"velocity": [1.25, -2.1]}, "125 % of the velocity", "velocity", "a"),
+        ({"velocity": [0.5, 0], "acceleration": [-5, 0]}, "125 % of the acceleration", "acceleration", "a"),
+        ({"velocity": [0, 0.5], "acceleration": [0, 12]}, "150 % of the acceleration", "acceleration", "b"),
+    ],
+)
+def test_no_consumer_gets_rows_of_a_move_that_brakes_from_outside_of_its_limits(
+    start: dict[str, Any], used: str, kind: str, joint: str
+) -> None:
+    """Bounds that differ by direction count in theirs, and a signal before the move is none that brakes."""
+    text = (
+        "version: 1\nrobot: {joints: [{name: a}, {name: b}]}\n"
+        "limits: {velocity: [1, 2], acceleration: [[-4, 6], 8], jerk: 60}\n"
+        f"start: {json.dumps({'joints': [0, 0], **start})}\nmoves:\n"
+        "  - {signal: lamp, value: 1}\n  - {planner: jerk_limited, to: {joints: 1}, brake: true}\n"
+    )
+    plan = plan_job(job_from_text(text))
+    assert plan.verdict.passed
+    with pytest.raises(VerificationError) as caught:
+        refuse_braking(plan, "for nobody")
+    (problem,) = caught.value.problems
+    said = f"for nobody: the move starts outside of its limits, and brakes: {used} of {joint} used"
+    assert (problem.text(), problem.kind, problem.joint, problem.move) == (said, kind, joint, 1)
+    assert problem.place is not None
+    assert problem.place.line == 7
+    refuse_braking(planned(), "for nobody")

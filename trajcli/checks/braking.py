@@ -8,6 +8,7 @@ and only as far as the start leads; the jerk never is.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import takewhile
 
 import numpy as np
 
@@ -106,9 +107,13 @@ def judged_peaks(
     judged = [Peaks(*(np.array(getattr(extremes, name)) for name in names)) for extremes in peaks.of_orders]
     for k, how in brake.items():
         own = _beside_braking(trajectory, trajectory.spans[k], limits_by_move[k], peaks[k], how == "line")
-        for extremes, of_span in zip(judged, own, strict=True):
+        before = [*takewhile(lambda j: not trajectory.spans[j].duration, range(k - 1, -1, -1))]
+        for extremes, whole, of_span in zip(judged, peaks[k], own, strict=True):
             for name in names:
                 getattr(extremes, name)[k] = getattr(of_span, name)
+            left_out = (of_span.low != whole.low) | (of_span.high != whole.high)
+            for j in before:  # what takes no time is where the move starts
+                extremes.low[j, left_out] = extremes.high[j, left_out] = 0.0
     return IntervalPeaks(tuple(judged))
 
 
