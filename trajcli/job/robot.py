@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -40,7 +40,6 @@ from trajcli.language.numbers import (
 )
 from trajcli.language.per_joint import UNLIMITED, LowerUpper
 from trajcli.language.poses import Pose
-from trajcli.suggest import nearest
 from trajcli.units import Quantity, Units, units_of
 
 if TYPE_CHECKING:
@@ -103,11 +102,19 @@ class JointModel(Model):
     def _announce_type(cls, data: Any, info: ValidationInfo) -> Any:  # noqa: ANN401
         # the units of the limits depend on the type, which stands beside them, perhaps mistyped
         if isinstance(info.context, ReadingContext) and isinstance(data, dict):
-            unknown = [str(key) for key in data if key not in cls.model_fields]
-            key = nearest("type", unknown) if unknown and "type" not in data else "type"
-            given = data.get(key, _TYPES[0])
-            info.context.joint_types = (given if given in _TYPES else nearest(str(given), _TYPES) or "",)
+            given = data.get("type", _TYPES[0])
+            if given not in _TYPES or not data.keys() <= cls.model_fields.keys():
+                given = _meant_type(data, cls.model_fields)
+            info.context.joint_types = (given,)
         return data
+
+
+def _meant_type(joint: Mapping[str, Any], names: Container[str]) -> str:
+    """Return how a joint moves by what stands there, its key or its word perhaps mistyped."""
+    from trajcli.suggest import nearest
+
+    key = "type" if "type" in joint else nearest("type", (key for key in joint if key not in names))
+    return nearest(str(joint.get(key or "", _TYPES[0])), _TYPES) or ""
 
 
 class _Counted:
@@ -283,6 +290,8 @@ def find_sheet(value: Any, document: Document, units: Units) -> RobotSheet:  # n
                 Problem("a robot inside a job uses the job's units", "leave `units` out here", place)
             )
         if "joints" not in value:
+            from trajcli.suggest import nearest
+
             near = nearest(key, ["file", "urdf", *RobotModel.model_fields])
             if near in ("file", "urdf"):
                 raise InputError(Problem(f"unknown key '{key}'", f"did you mean '{near}'?", place))
