@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from trajcli.suggest import abridged, did_you_mean, named_like, nearest, nearest_names, valid_names
+from trajcli.suggest import (
+    abridged,
+    did_you_mean,
+    meant_word,
+    named_like,
+    nearest,
+    nearest_names,
+    valid_names,
+)
 
 PLANNERS = ["cubic", "quintic", "septic", "jerk_limited", "hold"]
 
@@ -87,3 +95,22 @@ def test_a_quoted_text_is_whole_up_to_a_hundred_characters(length: int) -> None:
 )
 def test_a_quoted_text_is_one_line_without_what_steers_a_terminal(text: str, line: str) -> None:
     assert abridged(text) == line
+
+
+@pytest.mark.parametrize(
+    ("mapping", "meant"),
+    [
+        ({"type": "prismatic"}, "prismatic"),
+        ({"type": "Prismtic", "tipe": "revolute"}, "prismatic"),
+        ({"tipe": "prismatic"}, "prismatic"),
+        ({"tpe": "prismtc", "d": 3}, "prismatic"),
+        ({"d": "prismatic"}, "revolute"),
+        ({}, "revolute"),
+        ({"type": "helix"}, None),
+        ({"type": 3}, None),
+    ],
+)
+def test_a_word_is_meant_though_it_or_its_key_is_mistyped(
+    mapping: dict[str, object], meant: str | None
+) -> None:
+    assert meant_word(mapping, "type", ("type", "d"), ("revolute", "prismatic")) == meant

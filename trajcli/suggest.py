@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Container, Iterable, Mapping, Sequence
 
 _QUOTED = 100  # characters of a text in messages
 _LONGEST = 64  # characters: nobody mistypes more, and difflib's time grows with the square
@@ -32,6 +32,14 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
         plain.setdefault(_plain(valid), valid)
     near = get_close_matches(_plain(name), plain, 1)
     return plain[near[0]] if near else None
+
+
+def meant_word(
+    mapping: Mapping[str, Any], key: str, keys: Container[str], words: Sequence[str]
+) -> str | None:
+    """Return which of `words` a mapping gives under a key, both perhaps mistyped; without it the first."""
+    near = key if key in mapping else nearest(key, (other for other in mapping if other not in keys))
+    return nearest(str(mapping.get(near or "", words[0])), words)
 
 
 def nearest_names(name: str, names: Iterable[str], count: int = 3) -> list[str]:

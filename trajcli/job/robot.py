@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -104,17 +104,11 @@ class JointModel(Model):
         if isinstance(info.context, ReadingContext) and isinstance(data, dict):
             given = data.get("type", _TYPES[0])
             if given not in _TYPES or not data.keys() <= cls.model_fields.keys():
-                given = _meant_type(data, cls.model_fields)
+                from trajcli.suggest import meant_word
+
+                given = meant_word(data, "type", cls.model_fields, _TYPES)
             info.context.joint_types = (given,)
         return data
-
-
-def _meant_type(joint: Mapping[str, Any], names: Container[str]) -> str:
-    """Return how a joint moves by what stands there, its key or its word perhaps mistyped."""
-    from trajcli.suggest import nearest
-
-    key = "type" if "type" in joint else nearest("type", (key for key in joint if key not in names))
-    return nearest(str(joint.get(key or "", _TYPES[0])), _TYPES) or ""
 
 
 class _Counted:
@@ -495,11 +489,7 @@ def _from_file_entry(value: Mapping[str, Any], document: Document) -> RobotSheet
 
 
 def _validated(
-    value: Mapping[str, Any],
-    document: Document,
-    at: tuple[str, ...],
-    units: Units,
-    kind: type[M],
+    value: Mapping[str, Any], document: Document, at: tuple[str, ...], units: Units, kind: type[M]
 ) -> M:
     try:
         return kind.model_validate(value, context=ReadingContext(units))
