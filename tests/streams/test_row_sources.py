@@ -98,3 +98,10 @@ def test_a_column_that_stands_and_was_not_rounded_stays_exact() -> None:
     """Beside one of its kind that shows three decimals, and one that stands and shows one."""
     still, alike = np.array([True, False, True]), ["q", "q", "q"]
     assert decimals_of_still(np.array([EXACT, 3, 1]), still, alike).tolist() == [EXACT, 3, 3]
+
+
+def test_a_joint_that_stands_has_no_decimals_of_a_slide_that_came_from_millimetres() -> None:
+    """Nine in mm are twelve in m, nine in rad are nine; all digits of a float64 are all of each joint."""
+    still, alike = np.array([True, True, True]), ["q", "q", "q"]
+    for found, expected in (([9, 12, 2], [9, 12, 9]), ([10, 12, 2], [10, 12, 9]), ([9, 16, 2], [16, 16, 16])):
+        assert decimals_of_still(np.array(found), still, alike).tolist() == expected

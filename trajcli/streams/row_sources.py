@@ -12,6 +12,7 @@ from trajcli.curves.piecewise import Array
 from trajcli.errors import InputError, Place
 from trajcli.frozen import frozen
 from trajcli.streams.byte_source import ByteSource
+from trajcli.streams.decimals import DECIMALS
 from trajcli.streams.mcap.read import LoggedMotion, log_blocks
 from trajcli.streams.recorded.column_names import TIME, read_name
 from trajcli.streams.recorded.column_roles import NamedFile
@@ -62,6 +63,7 @@ def decimals_of_still(
     """Return the decimals of columns (m,); those that show one number alone have the most of their kind.
 
     Who writes the shortest digits writes 0.25 for 0.250000: a joint that stands says nothing of its decimals.
+    It has nine at most, unless it shows more: a slide that was planned in mm has twelve in m.
 
     Args:
         decimals: That each shows.
@@ -71,7 +73,8 @@ def decimals_of_still(
     found = decimals.copy()
     for kind in set(alike):
         among = np.array([other == kind for other in alike])
-        found[among & still & (decimals != EXACT)] = decimals[among].max()
+        chosen, most = among & still & (decimals != EXACT), int(decimals[among].max())
+        found[chosen] = np.maximum(decimals[chosen], min(most, DECIMALS) if most < FULL_DECIMALS else most)
     return found
 
 
