@@ -333,6 +333,13 @@ def test_rows_at_a_rate_and_at_knots_are_called_both() -> None:
     assert isinstance(made.grid, KnotGrid)
 
 
+def test_rows_of_a_message_are_at_its_knots_whatever_the_rate_of_the_job() -> None:
+    """The knots of the motion keep limits that its rows at 100 Hz pass."""
+    loaded = load_job(str(EXAMPLES / "scara_pick.yaml"))
+    made = plan_for(*job_for(loaded, "ros-jtc", {}), Writing(form=FORMATS["ros"]))
+    assert made.where == "for ros-jtc at its knots"
+
+
 @pytest.mark.full
 def test_stretches_that_leave_a_step_at_the_end_of_a_move_are_not_planned(
     monkeypatch: pytest.MonkeyPatch,

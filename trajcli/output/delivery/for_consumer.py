@@ -139,10 +139,10 @@ class ForConsumer:
     @property
     def where(self) -> str:
         """The consumer, and where the rows stand, in words."""
-        output, rows = self.plan.loaded.job.output, "given times"
-        if isinstance(self.grid, UniformGrid):
-            rows = f"{self.grid.rate:g} Hz"
-        elif isinstance(self.grid, KnotGrid):
+        output, grid, rows = self.plan.loaded.job.output, self.rows.grid, "given times"
+        if isinstance(grid, UniformGrid):
+            rows = f"{grid.rate:g} Hz"
+        elif isinstance(grid, KnotGrid):
             rows = f"{output.rate:g} Hz and its knots" if output.rows == "both" else "its knots"
         return f"for {self.profile.name} at {rows}"
 
