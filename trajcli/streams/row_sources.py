@@ -73,8 +73,10 @@ def decimals_of_still(
     found = decimals.copy()
     for kind in set(alike):
         among = np.array([other == kind for other in alike])
-        chosen, most = among & still & (decimals != EXACT), int(decimals[among].max())
-        found[chosen] = np.maximum(decimals[chosen], min(most, DECIMALS) if most < FULL_DECIMALS else most)
+        chosen, largest = among & still & (decimals != EXACT), int(decimals[among].max())
+        found[chosen] = np.maximum(
+            decimals[chosen], min(largest, DECIMALS) if largest < FULL_DECIMALS else largest
+        )
     return found
 
 
