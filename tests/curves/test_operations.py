@@ -16,6 +16,7 @@ from trajcli.curves.operations import (
     merge_breaks,
     reverse,
     scale_time,
+    stacked,
 )
 from trajcli.curves.piecewise import PiecewisePolynomial, concatenate, constant
 
@@ -245,3 +246,21 @@ def test_a_curve_is_cut_where_something_is_left_of_both_parts(time):
     curve = PiecewisePolynomial([-2.0, 1.0, 3.0], np.ones((2, 2, 1)))
     with pytest.raises(ValueError, match=r"is no time within \[-2\.0, 3\.0\]"):
         cut(curve, time)
+
+
+@pytest.mark.parametrize("joints", [1, 3, 4, 7])
+def test_pieces_of_lower_degree_are_filled_up_whatever_the_number_of_joints(joints):
+    rng = np.random.default_rng(joints)
+    blocks = [rng.normal(size=(rows, pieces, joints)) for rows, pieces in ((2, 3), (4, 1), (1, 2))]
+    whole = stacked(blocks)
+    assert whole.shape == (4, 6, joints)
+    x = np.array([0.0, 0.3, -2.0])
+    first = 0
+    for block in blocks:
+        for piece in range(block.shape[1]):
+            for joint in range(joints):
+                values = np.polyval(whole[:, first + piece, joint], x)
+                np.testing.assert_allclose(
+                    values, np.polyval(block[:, piece, joint], x), rtol=1e-14, atol=1e-14
+                )
+        first += block.shape[1]

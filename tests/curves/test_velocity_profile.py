@@ -67,6 +67,13 @@ def test_ramps_to_a_cruise_speed_may_be_too_steep() -> None:
     assert (caught.value.reason, caught.value.low) == ("acceleration", 2.25)
 
 
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1.0, 1e6])
+def test_a_cruise_speed_fits_a_small_motion_as_it_fits_a_large_one(size: float) -> None:
+    for speed in (1.01, 1.5, 1.99):
+        profile = profile_of_speed(2.0 * size, 0.0, 0.0, 2.0, speed * size)
+        assert profile.knots[0] == pytest.approx((2.0 - 2.0 / speed, speed * size))
+
+
 @pytest.mark.parametrize("ends", [(3.0, 0.0), (0.0, 3.0), (3.0, 2.5), (2.5, 3.0), (3.0, 0.5), (0.5, 3.0)])
 @pytest.mark.parametrize("distance", [1.0, 2.5, 12.0])
 def test_ends_above_the_speed_are_left_and_reached_with_the_rates_that_are_given(
