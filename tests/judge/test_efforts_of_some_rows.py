@@ -165,6 +165,46 @@ def test_an_excess_is_as_certain_as_the_rounding_where_it_is(over: float, certai
     assert found.certainty == ("exceeded" if certain else "within rounding")
 
 
+@pytest.mark.parametrize(("share", "certainty"), [(0.9, "within rounding"), (1.1, "exceeded")])
+def test_a_centripetal_force_is_as_uncertain_as_the_place_it_acts_at(share: float, certainty: str) -> None:
+    """A slide holds 2 kg half a metre from an axis that turns with 3 rad/s: 9 N, and m w^2 for each metre of error."""
+    off, force, t = 1e-3, 2.0 * 0.5 * 3.0**2, 100.0 * np.arange(3)
+    joints = tuple(
+        Joint(name, kind, alpha=tilt, link=LinkInertia(2.0, (0.0,) * 3, (0.0,) * 6))
+        for name, kind, tilt in (("turn", "revolute", 0.0), ("slide", "prismatic", np.pi / 2))
+    )
+    bounds = np.array([[-np.inf, np.inf], [-(force - share * 2.0 * 3.0**2 * off), np.inf]])
+    limits = replace(unlimited(2), effort=bounds)
+    robot = Robot("arm", joints, limits, "modified", np.eye(4), np.eye(4), gravity=np.zeros(3))
+    columns = [np.stack([3.0 * t, 0.5 + 0 * t], axis=1), np.tile([3.0, 0.0], (3, 1)), np.zeros((3, 2))]
+    off_by = Resolution(0.0, np.array([0.0, off]), np.zeros(2), np.zeros(2))
+    rows = RecordedMotion(t, *columns, None, None, None, None, off_by, "rows")
+    (found,) = [f for f in judge_motion(lambda: [rows], Requirements(robot)).findings if f.kind == "effort"]
+    assert (found.value, found.certainty) == (pytest.approx(-force, rel=1e-4), certainty)
+    assert found.rounding == pytest.approx(2.0 * 3.0**2 * off, rel=0.01)
+
+
+@pytest.mark.parametrize(("back", "time", "row"), [(False, 4.0, 4), (True, 0.02, 2)])
+def test_a_force_at_the_start_of_a_motion_is_not_told_where_the_one_before_ends(
+    back: bool, time: float, row: int
+) -> None:
+    """One ends with 9.5 rad/s^2, the next begins with 10 and brakes at once; a pause between states positions alone.
+
+    So it is the other way round, where the first one ends with the larger force.
+    """
+    t = np.array([0.0, 2.0, 3.0, 4.0, 4.02])
+    states = [
+        np.array([1.0, 0.0, 1.0, 0.0, -0.0053]),
+        np.array([0.0, 0.0, np.nan, 0.0, -0.9]),
+        np.array([0.0, 9.5, np.nan, 10.0, -100.0]),
+    ]
+    if back:
+        t, states = t[-1] - t[::-1], [states[0][::-1], -states[1][::-1], states[2][::-1]]
+    (found,) = efforts(pendulum(1.05), t, states, (1e-6, 1e-6, 1e-6), "jtc")
+    assert found.value == pytest.approx(WEIGHT + INERTIA * 10.0, rel=1e-6)
+    assert (pytest.approx(found.time), found.row) == (time, row)
+
+
 def test_the_mean_of_a_cubic_behind_a_quintic_is_told_in_its_own_middle() -> None:
     """In 10 ms its velocity grows by 1 rad/s: 1 N m, and the weight. A line before both takes nothing."""
     none, t = np.nan, np.append(0.0, 1.0 + AT)
