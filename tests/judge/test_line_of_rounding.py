@@ -11,6 +11,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
+from judge.test_between_rows import LAW, OVER, PEAK, approach, over, peaked
 from recorded_rows import bare_robot
 
 from trajcli.findings import Finding
@@ -230,3 +231,32 @@ def test_forces_of_two_slides(limited, turned, piece, planted, certainty, side):
     assert (found.certainty, found.severity) == (certainty, "error")
     assert found.value == pytest.approx(side * mass * share * 0.5, rel=1e-5)
     assert found.rounding == pytest.approx(rounding, rel=1e-5)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_where_the_distance_lets_nobody_approach_each_speed_is_too_fast(side):
+    """At 0.4 within o^2 / (2 d) = 0.5 of the end; away from it nothing is wrong."""
+    t, q = np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.2, 0.4])
+    limits = replace(
+        unlimited(1),
+        position=np.array([sorted([side * 0.49, -side * 9.0])]),
+        velocity_by_position=np.array([[1.0, 1.0]]),
+    )
+    exact = Resolution(0.0, *[np.full(1, 1e-6)] * 3)
+    for places, verdict in ((q, "exceeded"), (q[::-1], "satisfied")):
+        motion = RecordedMotion(t, side * places[:, None], None, None, None, None, None, None, exact, "rows")
+        judged = judge_motion(lambda rows=motion: [rows], Requirements(bare_robot(limits)))
+        assert judged.verdict == verdict
+        for found in judged.findings:
+            assert (found.limit, found.value) == (pytest.approx(0.0, abs=1e-9), pytest.approx(side * 0.4))
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize(
+    ("size", "off", "severity"), [(1.0, 1e-5, "warning"), (1.5, 0.0, "error"), (1.5, 1e-5, "warning")]
+)
+def test_rounding_explains_of_an_approach_what_a_change_of_the_law_leaves(size, off, severity, side):
+    motion = peaked(1, 2, size * LAW, side)
+    rounded = replace(motion, resolution=Resolution(0.0, np.full(1, off), np.zeros(1), np.zeros(1)))
+    (found,) = over(rounded, bare_robot(approach(side, PEAK - OVER)))
+    assert (found.kind, found.severity) == ("velocity_by_position", severity)
