@@ -13,6 +13,7 @@ from trajcli.consumers.differences import Differences, VelocityTowardsEnds
 from trajcli.consumers.executed import RoundedSegments, approach_excesses
 from trajcli.consumers.profile import ConsumerRule, Source
 from trajcli.consumers.rule_check import Surroundings
+from trajcli.consumers.states import EffortAbsent, JointCount, JointNames
 from trajcli.kinematics.robot import Limits
 from trajcli.streams.recorded_motion import RecordedMotion
 
@@ -88,3 +89,30 @@ def test_a_curve_to_a_first_point_that_moves_is_the_one_that_scipy_makes(columns
         ((joint, _, value, limit, time),) = found
         assert (joint, value, limit) == (4, pytest.approx(peak, rel=1e-6), pytest.approx(0.9 * peak))
         assert curve.derivative(order)(time) == pytest.approx(peak, rel=1e-6)
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "1 joint,"), (2, "2 joints,"), (3, "3 joints,")])
+def test_another_number_of_joints_is_told_beside_that_of_the_consumer(count: int, words: str) -> None:
+    rows = motion(rows=3, columns="q")
+    check = JointCount(rule(count=7.0), Surroundings())
+    check.take(replace(rows, q=rows.q[:, :count]))
+    (found,) = check.findings()
+    assert (found.value, found.limit, found.message) == (count, 7.0, f"the rows have {words} and 7 are moved")
+
+
+def test_efforts_of_a_point_are_counted_where_there_shall_be_none() -> None:
+    rows = motion(rows=5, columns="q")
+    tau = np.full((5, 7), np.nan)
+    tau[3] = 0.0
+    check = EffortAbsent(rule(), Surroundings())
+    check.take(replace(rows, tau=tau))
+    (found,) = check.findings()
+    assert (found.value, found.limit, found.row) == (7.0, 0.0, 4)
+
+
+def test_a_joint_that_the_robot_has_not_is_one_where_none_is_allowed() -> None:
+    rows = motion(rows=3, columns="q")
+    check = JointNames(rule(), Surroundings(joints=("elbow", *(rows.joints or ())[1:])))
+    check.take(rows)
+    assert {(found.value, found.limit) for found in check.findings()} == {(1.0, 0.0)}
+    assert "the joint 'elbow' is missing" in [found.message for found in check.findings()]
