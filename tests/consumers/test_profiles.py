@@ -266,6 +266,17 @@ def test_every_flaw_of_a_file_is_named(tmp_path: Path, old: str, new: str, messa
     assert all(problem.place is not None for problem in caught.value.problems)
 
 
+def test_a_key_that_nobody_knows_is_told_where_it_stands(tmp_path: Path) -> None:
+    """Not where its value does."""
+    text = WHOLE.replace("rate: 250", "rate: 250, speed: 40", 1)
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    (problem,) = caught.value.problems
+    before = text[: text.index("speed: 40")].splitlines()
+    assert problem.place is not None
+    assert (problem.place.line, problem.place.column) == (len(before), len(before[-1]) + 1)
+
+
 @pytest.mark.parametrize("key", ["title", "sources", "rules"])
 def test_what_every_file_has(tmp_path: Path, key: str) -> None:
     """A file without it is refused, whatever follows from that besides."""
