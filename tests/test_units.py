@@ -9,7 +9,7 @@ from any_text import CHARACTERS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from trajcli.errors import Amount
+from trajcli.errors import Amount, InputError
 from trajcli.units import (
     Quantity,
     UnitError,
@@ -20,6 +20,7 @@ from trajcli.units import (
     factor,
     joint_quantity,
     joint_units,
+    named_units,
     parse_quantity,
     to_user,
     typeset,
@@ -239,3 +240,25 @@ def test_amounts_of_messages_are_said_in_the_units_of_the_user(amount: Amount, t
 )
 def test_units_are_those_that_are_right(value: object, units: Units) -> None:
     assert units_of(value) == units
+
+
+def test_a_text_names_one_unit_of_each_dimension() -> None:
+    assert named_units("mm") == {"length": "mm"}
+    assert named_units(" m, rad") == {"length": "m", "angle": "rad"}
+    assert named_units("us,deg", ("us", "ms")) == {"time": "us", "angle": "deg"}
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("degs", "--units: unknown unit 'degs'", "did you mean 'deg'?"),
+        ("deg,", "--units: unknown unit ''", "units are rad, deg, m, mm, ms"),
+        ("us", "--units: unknown unit 'us'", "units are rad, deg, m, mm, ms"),
+        ("m,deg,mm", "--units: m and mm are both units of length", None),
+    ],
+)
+def test_units_that_are_none_or_too_many_are_refused(text: str, message: str, hint: str | None) -> None:
+    with pytest.raises(InputError) as caught:
+        named_units(text, ("ms",))
+    (problem,) = caught.value.problems
+    assert (problem.message, problem.hint) == (message, hint)

@@ -21,10 +21,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Literal
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, get_args
 
-from trajcli.errors import Amount
+from trajcli.errors import Amount, InputError
 from trajcli.frozen import comparable
 
 Dimension = Literal["angle", "length", "time", "frequency", "ratio", "mass", "force", "torque", "inertia"]
@@ -150,6 +150,33 @@ def joint_units(joint_types: Sequence[str], order: int = 0) -> list[str]:
 def effort_unit(joint_type: str) -> str:
     """Return the unit of what drives a joint, the same in all units of a job."""
     return _FIXED[effort_quantity(joint_type).dimension]
+
+
+def named_units(text: str, times: Iterable[str] = ()) -> dict[str, str]:
+    """Return the unit of each dimension that the option `--units`, such as "deg,mm", names.
+
+    Args:
+        text: Its value.
+        times: Units of time that it may name.
+
+    Raises:
+        InputError: When one is unknown, or two are of one dimension.
+    """
+    from trajcli.suggest import did_you_mean
+
+    measured = dict.fromkeys(get_args(AngleUnit), "angle") | dict.fromkeys(get_args(LengthUnit), "length")
+    measured |= dict.fromkeys(times, "time")
+    named: dict[str, str] = {}
+    for unit in map(str.strip, text.split(",")):
+        if unit not in measured:
+            hint = did_you_mean(unit, measured) or f"units are {', '.join(measured)}"
+            raise InputError(f"--units: unknown unit '{unit}'", hint=hint)
+        if measured[unit] in named:
+            raise InputError(
+                f"--units: {named[measured[unit]]} and {unit} are both units of {measured[unit]}"
+            )
+        named[measured[unit]] = unit
+    return named
 
 
 def typeset(unit: str) -> str:

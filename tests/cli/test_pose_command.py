@@ -214,7 +214,7 @@ BAD = [
     (["{rpy: [0, 0, 0], quat_wxyz: [1, 0, 0, 0]}"], "exclude each other"),
     (["{quat_wxyz: [1, 1, 0, 0]}"], "the quaternion has length 1.41421"),
     (["[1, 2, 3]"], "expected a mapping"),
-    (["{}", "--units", "grad"], "expected rad or deg, m or mm, got grad"),
+    (["{}", "--units", "grad"], "unknown unit 'grad'"),
     (["{}", "--units", "deg,rad"], "both units of angle"),
     (["{xyz: [0, 0, 0]}", "--euler", "ZZY"], "is no sequence of Euler angles"),
     (["{xyz: [0, 0, 0]}", "--euler", "ZYZ:fxed"], "did you mean 'fixed'?"),

@@ -25,6 +25,7 @@ from trajcli.units import (
     amount_text,
     factor,
     joint_quantity,
+    named_units,
     unit_name,
     units_of,
 )
@@ -240,16 +241,9 @@ def parse_units(text: str, default: Units = Units()) -> Units:  # noqa: B008
     """Return the units that "deg,mm" names; what it leaves out is that of `default`.
 
     Raises:
-        InputError: When a word is none of rad, deg, m and mm, or two name units of the same kind.
+        InputError: When a unit is unknown, or two are of one dimension.
     """
-    chosen: dict[str, str] = {}
-    for word in filter(None, (part.strip() for part in text.split(","))):
-        if word not in ("rad", "deg", "m", "mm"):
-            raise InputError(f"--units: expected rad or deg, m or mm, got {word}", hint="such as deg,mm")
-        kind = "angle" if word in ("rad", "deg") else "length"
-        if kind in chosen:
-            raise InputError(f"--units: {chosen[kind]} and {word} are both units of {kind}")
-        chosen[kind] = word
+    chosen = named_units(text) if text else {}
     angle, length = chosen.get("angle", default.angle), chosen.get("length", default.length)
     return Units("deg" if angle == "deg" else "rad", "mm" if length == "mm" else "m")
 

@@ -16,7 +16,6 @@ from trajcli.frozen import comparable, frozen
 from trajcli.kinematics.robot import JointType
 from trajcli.streams.recorded.column_names import ColumnName
 from trajcli.streams.recorded.column_roles import ColumnRoles, NamedFile
-from trajcli.suggest import did_you_mean
 from trajcli.units import (
     AngleUnit,
     Dimension,
@@ -26,6 +25,7 @@ from trajcli.units import (
     Units,
     factor,
     joint_quantity,
+    named_units,
     parse_quantity,
 )
 
@@ -57,22 +57,7 @@ def parse_units(units: str | Units | None) -> SaidUnits:
     """
     if not isinstance(units, str):
         return SaidUnits() if units is None else SaidUnits(units.angle, units.length)
-    said: dict[str, str] = {}
-    measured = {
-        "rad": "angle",
-        "deg": "angle",
-        "m": "length",
-        "mm": "length",
-        **dict.fromkeys(_PER_SECOND, "time"),
-    }
-    for part in units.split(","):
-        unit = part.strip()
-        if unit not in measured:
-            hint = did_you_mean(unit, measured) or f"units are {', '.join(measured)}"
-            raise InputError(f"--units: unknown unit '{unit}'", hint=hint)
-        if measured[unit] in said:
-            raise InputError(f"--units: {said[measured[unit]]} and {unit} are both units of {measured[unit]}")
-        said[measured[unit]] = unit
+    said = named_units(units, _PER_SECOND)
     return SaidUnits(
         cast("AngleUnit | None", said.get("angle")),
         cast("LengthUnit | None", said.get("length")),
