@@ -38,7 +38,6 @@ class JointMessage:
     """A joint trajectory, SI.
 
     Attributes:
-        file: Its name.
         joint_names: n names.
         times: Time from the start of each point, s, shape (N,).
         position: Shape (N, n).
@@ -48,7 +47,6 @@ class JointMessage:
         decimals: The most that a number of each column shows: of the times, the positions and so on, (m,).
     """
 
-    file: str
     joint_names: tuple[str, ...]
     times: Array
     position: Array
@@ -174,7 +172,7 @@ def _message(message: Mapping[str, Any], file: str) -> JointMessage:
     )
     seconds = np.array([time for time, _ in times])
     shown = np.array(decimals, dtype=np.int64)
-    return JointMessage(file, tuple(names), seconds, position, velocity, acceleration, effort, shown)
+    return JointMessage(tuple(names), seconds, position, velocity, acceleration, effort, shown)
 
 
 def _values(points: Sequence[Any], key: str, joints: int, file: str) -> Iterator[list[float]]:

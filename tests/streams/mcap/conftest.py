@@ -26,7 +26,7 @@ def read_mcap(path: Path, topic: str | None = None, field: str | None = None) ->
     with path.open("rb") as stream:
         blocks = list(log_blocks(stream, str(path), topic, field))
     joined = [np.concatenate([getattr(block, name) for block in blocks]) for name in ARRAYS]
-    return LoggedMotion(str(path), blocks[0].topic, blocks[0].joint_names, *joined)
+    return LoggedMotion(blocks[0].topic, blocks[0].joint_names, *joined)
 
 
 def write_log(plan: Plan, path: Path, **options: str) -> Path:

@@ -41,7 +41,6 @@ class LoggedMotion:
     """The motion in a topic of a log, SI.
 
     Attributes:
-        file: Its name.
         topic: Its topic.
         joint_names: n names.
         times: s, shape (N,); of stamps that are times of a clock, from the first of them.
@@ -51,7 +50,6 @@ class LoggedMotion:
         effort: Likewise; drivers without sensors of effort say NaN.
     """
 
-    file: str
     topic: str
     joint_names: tuple[str, ...]
     times: Array
@@ -287,4 +285,4 @@ def _motion(file: str, topic: str, series: JointSeries, clock: _Clock, before: i
                 f"{values[row, joint]}",
                 hint="only finite numbers can be compared",
             )
-    return LoggedMotion(file, topic, series.names, clock.seconds(series.nanoseconds), *parts, series.effort)
+    return LoggedMotion(topic, series.names, clock.seconds(series.nanoseconds), *parts, series.effort)
