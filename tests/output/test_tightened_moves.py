@@ -171,3 +171,63 @@ def test_no_consumer_gets_rows_of_a_move_that_brakes_from_outside_of_its_limits(
     assert problem.place is not None
     assert problem.place.line == 7
     refuse_braking(planned(), "for nobody")
+
+
+def test_a_move_that_ends_on_a_row_is_stretched_from_there() -> None:
+    """A trapezoid over 1 rad at 1 rad/s and 4 rad/s^2 lasts 1.25 s, and 1.3 s with rows at 10 Hz."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 1, "acceleration": 4},
+        "when_over_limit": "slow",
+        "start": {"joints": [0]},
+        "moves": [{"planner": "trapezoid", "to": {"joints": [1]}}],
+        "output": {"rate": 10, "align": True},
+    }
+    adapted = Adaptation()
+    plan = plan_job(job_from_text(json.dumps(job)), adapted=adapted)
+    assert plan.trajectory.duration == pytest.approx(1.3, rel=1e-12)
+    longer = tightened(plan, (), [(1.002, 1, 0, 0)], adapted)
+    assert longer is not None
+    assert longer.stretches == {0: pytest.approx(1.3 / 1.25 * 1.002, rel=1e-8)}
+    again = plan_job(job_from_text(json.dumps(job)), adapted=longer)
+    assert again.trajectory.duration == pytest.approx(1.4, rel=1e-12)
+
+
+def test_what_one_move_of_a_chain_passes_makes_the_chain_slower_than_it_is() -> None:
+    """All of a chain is stretched alike, by the most that is asked for in any of its moves."""
+    move = {"planner": "jerk_limited", "zone": {"joints": 0.1}}
+    job = {
+        "version": 1,
+        "robot": {"joints": 2},
+        "limits": {"velocity": 2, "acceleration": 4, "jerk": 40},
+        "when_over_limit": "slow",
+        "start": {"joints": [0, 0]},
+        "moves": [move | {"to": {"joints": to}} for to in ([1, 0], [1, 1])],
+    }
+    job["moves"][-1].pop("zone")
+    loaded, adapted = job_from_text(json.dumps(job)), Adaptation(stretches={0: 1.2})
+    plan, fastest = plan_job(loaded, adapted=adapted), plan_job(loaded).trajectory.duration
+    assert plan.trajectory.duration == pytest.approx(1.2 * fastest, rel=1e-12)
+    longer = tightened(plan, (), [(1.331, 3, 0, 1)], adapted, stretched=True)
+    assert longer is not None
+    assert longer.stretches == {0: 1.2, 1: pytest.approx(1.2 * 1.1, rel=1e-8)}
+    assert plan_job(loaded, adapted=longer).trajectory.duration == pytest.approx(1.32 * fastest, rel=1e-8)
+
+
+def test_a_move_that_limits_have_stretched_already_is_not_stretched_for_that_again() -> None:
+    """A quintic over 0.5 rad in 0.25 s reaches 15/8 * 2 rad/s: within 1.5 it lasts 2.5 times as long."""
+    job = {
+        "version": 1,
+        "robot": {"joints": 1},
+        "limits": {"velocity": 1.5},
+        "when_over_limit": "slow",
+        "start": {"joints": [0]},
+        "moves": [{"planner": "quintic", "to": {"joints": [0.5]}, "duration": 0.25}],
+    }
+    adapted = Adaptation()
+    plan = plan_job(job_from_text(json.dumps(job)), adapted=adapted)
+    assert plan.moves[0].stretch == pytest.approx(2.5, rel=1e-9)
+    longer = tightened(plan, (), [(1.002, 1, 0, 0)], adapted)
+    assert longer is not None
+    assert longer.stretches == {0: pytest.approx(1.002, rel=1e-8)}

@@ -44,7 +44,6 @@ _SLACK = 1e-6  # relative: what a joined curve may be above a limit
 _COARSE = 0.05  # of a limit: what decimals alone may make up between knots
 _PERIODS = 200  # periods by which a motion is stretched as a whole, one after the other
 _FEW_PERIODS = 32  # likewise, where nothing else was found
-_FEW_THROUGH_ZONES = 16  # likewise, where corners are flown by
 _BY_RULE = 3.0  # times a limit of a rule: what passes it by more is a step, as of a start in motion
 _ENOUGH = 1e-6  # relative: a motion that lasts longer by less than that needs no other beside it
 _LONGER = 1e-9  # relative: a duration that differs by less is the same
@@ -381,8 +380,13 @@ class _Search:
                 )
 
     def _stretched(self, first: ForConsumer, best: ForConsumer | None) -> ForConsumer | None:
-        """Return the motion stretched as a whole by the fewest periods that do, where that beats the best."""
+        """Return the motion stretched as a whole by the fewest periods that do, where that beats the best.
+
+        Through zones a motion has too many breaks for all of them to fall on rows by chance.
+        """
         if not isinstance(first.grid, UniformGrid) or self._writing.form.content == "knots":
+            return None
+        if self._loaded.job.flies_by:
             return None
         from trajcli.output.delivery.slower_motion import StretchedMoves
 
@@ -390,7 +394,7 @@ class _Search:
         by_move = StretchedMoves(first.rows, rate, self._begun.fastest)
         longest = np.inf if best is None else best.duration
         count = _FEW_PERIODS if best is None else min(ceil((longest - duration) * rate), _PERIODS)
-        for periods in range(1, min(count, _FEW_THROUGH_ZONES) if self._loaded.job.flies_by else count):
+        for periods in range(1, count):
             factor = 1 + periods / (rate * duration)
             if by_move.are_over(factor):
                 continue

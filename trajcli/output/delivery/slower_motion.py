@@ -111,8 +111,17 @@ def tightened(
                 _tighten(caps, plan, number, (kind, excess, joint))
     if caps == adapted.caps and not longer:
         return None
-    stretches = {index: adapted.stretches.get(index, 1.0) * factor for index, factor in longer.items()}
+    stretches = {
+        index: _stretch(adapted, plan.moves[moves[index]]) * factor for index, factor in longer.items()
+    }
     return replace(adapted, caps=caps, stretches={**adapted.stretches, **stretches})
+
+
+def _stretch(adapted: Adaptation, move: PlannedMove) -> float:
+    """Return how many times longer than its fastest a move lasts: with its chain, and up to the next row."""
+    fastest = adapted.fastest.get(adapted.key(move.index, move.start))
+    lasts = move.stretch if fastest is None else move.stretch / fastest.stretch
+    return max(adapted.stretches.get(move.index, 1.0), lasts)
 
 
 def _passed(
@@ -191,7 +200,7 @@ class StretchedMoves:
         """
         plan, first = rows.plan, Adaptation()
         moves = [planned.get(first.key(move.index, move.start)) for move in plan.moves if move.duration > 0]
-        fit = not plan.loaded.job.flies_by and rows.interpolation is not None
+        fit = rows.interpolation is not None
         self._moves = [move for move in moves if fit and move is not None and move.at_rest]
         self._rate, self._interpolation = rate, rows.interpolation or "linear"  # without one no move fits
         self._followed = {move.index: other for move, other in pairwise(moves) if move is not None}
