@@ -28,11 +28,12 @@ def made(
         trajectory=trajectory,
         loaded=Some(job=Some(output=Some(rows="rate", rate=125.0))),
     )
-    rows = Some(uses=lambda: list(uses), judged_orders=2, rounding=lambda: rounding)
+    grid = UniformGrid(3.0, 125.0)
+    rows = Some(uses=lambda: list(uses), judged_orders=2, rounding=lambda: rounding, grid=grid)
     joined = Some(findings=[Some(limit=limit) for limit in limits])
     rules = Some(findings=[Some(limit=None, severity=each) for each in severities])
     given: dict[str, Any] = {
-        "grid": UniformGrid(3.0, 125.0),
+        "grid": grid,
         "joined": joined,
         "rules": rules,
         "shortest": 2.5,

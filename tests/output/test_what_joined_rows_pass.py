@@ -52,9 +52,7 @@ def drawn(seed: int, stated: int, grid_kind: str, tools: int = 0) -> tuple[Any, 
     plan = made_plan(
         lengths, coefficients, [(n, robot, None) for n, robot in zip(counts, robots, strict=True)]
     )
-    return plan, JoinedRows(
-        plan, made_grid(rng, plan, grid_kind), ("t", *GROUPS[:stated], "move"), exact=True
-    )
+    return plan, JoinedRows(plan, made_grid(rng, plan, grid_kind), ("t", *GROUPS[:stated], "move"))
 
 
 def all_pieces(

@@ -60,13 +60,11 @@ class JoinedRows:
         plan: A plan that verifies.
         grid: Where its rows stand.
         groups: Its columns.
-        exact: Whether the numbers are written with every bit.
     """
 
     plan: Plan
     grid: Grid
     groups: tuple[Group, ...]
-    exact: bool = False
 
     @property
     def interpolation(self) -> Interpolation | None:
@@ -347,8 +345,7 @@ class JoinedRows:
         joints = len(self.plan.trajectory.joint_names)
         states = rows[:, :-1].reshape(len(rows), -1, joints)[where]
         moves = rows[:, -1].astype(np.int64)[where]
-        factors = joint_factors(self.plan.trajectory.joint_types, self.plan.loaded.output_units)
-        rounding = np.zeros(joints) if self.exact else _HALF_UNIT * np.asarray(factors)
+        exact = np.zeros(joints)  # what decimals make of it is the file's
         return JoinedPairs(
             t=np.append(0.0, np.cumsum(lengths)),
             lengths=lengths,
@@ -360,7 +357,7 @@ class JoinedRows:
             rows=index + 1,
             moves=moves[0],
             interpolation=chosen,
-            resolution=Resolution(0.0, rounding, rounding, rounding),
+            resolution=Resolution(0.0, exact, exact, exact),
             first=0,
             last=lengths.size,
             ends=False,
