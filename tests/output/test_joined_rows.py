@@ -88,6 +88,30 @@ def test_no_decimals_of_a_file_excuse_what_the_rows_of_a_plan_pass() -> None:
     assert [event.partition(":")[0] for event in judged.events] == ["joined_over_limit"]
 
 
+@pytest.mark.parametrize("velocity", [[1.3, 0.2], [0.2, -1.5]])
+def test_what_a_start_outside_of_its_limits_leads_to_is_no_offence_of_the_rows(velocity: list[float]) -> None:
+    """The move that brakes may be as fast as it starts, and no faster; the one behind it not even that."""
+    text = (
+        "version: 1\nrobot: {joints: 2}\nlimits: {velocity: 1, acceleration: 4, jerk: 60}\n"
+        f"start: {{joints: [0, 0], velocity: {velocity}}}\nmoves:\n"
+        "  - {planner: jerk_limited, to: {joints: [1, -1]}, brake: true}\n"
+        "  - {planner: jerk_limited, to: {joints: [0, 0]}}\noutput: {rate: 50, columns: [t, q, qd]}\n"
+    )
+    plan = plan_job(job_from_text(text))
+    assert plan.verdict.passed
+    judged = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement()
+    assert judged is not None
+    assert all(found.excess < 1.01 for found in judged.findings if found.kind == "velocity")  # cubics swing
+    slower = replace(plan, moves=[replace(m, planned=replace(m.planned, braking=None)) for m in plan.moves])
+    judged = joined_rows(slower, grid_of(plan), FORMATS["csv"]).judgement()
+    assert judged is not None
+    worst = max(
+        (found for found in judged.findings if found.kind == "velocity"), key=lambda found: found.excess
+    )
+    assert worst.move == 0
+    assert 1.1 < worst.excess < np.abs(velocity).max()
+
+
 def test_no_row_is_read_where_the_curve_itself_proves_it(monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[int] = []
     monkeypatch.setattr(module, "sample", lambda *args, **named: read.append(1) or sample(*args, **named))

@@ -10,21 +10,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajcli.columns import Group, joint_factors
-from trajcli.curves.extrema import piece_extremes
+from trajcli.curves.extrema import Peaks, piece_extremes
 from trajcli.curves.piecewise import Array, PiecewisePolynomial, derivative_coefficients, horner
 from trajcli.findings import Collector, Finding, at_time
 from trajcli.frozen import frozen
 from trajcli.grids import AT_BREAK, NANOSECOND, Grid, KnotGrid, ListedGrid, UniformGrid
 from trajcli.judge.judgement import Judgement, as_planned
 from trajcli.judge.reconstruction import Interpolation, chosen_interpolation
-from trajcli.kinematics.robot import Robot, ToolLimits
+from trajcli.kinematics.robot import QUANTITIES, Robot, ToolLimits
 from trajcli.limits.tolerances import JOINED_RELATIVE
+from trajcli.planners.planner import PlannedMove
 from trajcli.planning.plan import Plan
 from trajcli.planning.planned_move import path_of_tool
 from trajcli.samples import sample
@@ -156,7 +157,8 @@ class JoinedRows:
         from trajcli.judge.motion import Requirements
 
         plan = self.plan
-        return Requirements(plan.loaded.robot, {move.index: move.robot for move in plan.moves})
+        moves = zip(plan.moves, plan.verdict.peaks, strict=True)
+        return Requirements(plan.loaded.robot, {move.index: _allowed(move, peaks) for move, peaks in moves})
 
     @cached_property
     def same_curve(self) -> bool:
@@ -409,6 +411,18 @@ def _stepping(curve: PiecewisePolynomial, order: int) -> NDArray[np.bool_]:
         near = _CONTINUOUS * np.minimum(sizes[1:], sizes[:-1]) + _ROUNDING * np.maximum(sizes[1:], sizes[:-1])
         steps[low + 1 : low + len(first)] = (np.abs(first[1:] - last[:-1]) > near).any(axis=1)
     return steps
+
+
+def _allowed(move: PlannedMove, peaks: Sequence[Peaks]) -> Robot:
+    """Return the robot of a move, of one that brakes with what its start outside of the limits leads to."""
+    if move.planned.braking is None:
+        return move.robot
+    limits: dict[str, Any] = {}
+    for order in (1, 2):
+        low, high = move.robot.limits.of_order(order).T
+        bounds = np.minimum(low, peaks[order].low), np.maximum(high, peaks[order].high)
+        limits[QUANTITIES[order]] = np.stack(bounds, axis=1)
+    return replace(move.robot, limits=replace(move.robot.limits, **limits))
 
 
 def _shares(
