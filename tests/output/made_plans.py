@@ -56,7 +56,7 @@ def made_plan(
     joints = moves[0][1].joints
     still = State(*np.zeros((3, len(joints))))
     names, types = tuple(j.name for j in joints), tuple(j.type for j in joints)
-    planned = [SimpleNamespace(tool=path, parts=(), curve=curve) for _, _, path in moves]
+    planned = [SimpleNamespace(tool=path, parts=(), curve=curve, braking=None) for _, _, path in moves]
     return SimpleNamespace(
         trajectory=Trajectory(curve, names, types, tuple(spans), still, still),
         moves=[
