@@ -347,6 +347,7 @@ OF_A_TOOL = {
         (["q1"], "no column of time"),
         (["q1", "qd1"], "no column of time"),
         *((["t", "q1", *names], "the robot has no geometry") for names in OF_A_TOOL.values()),
+        (["t", "q1", "tau1"], "the robot of the job has no masses"),
         (["t", "q1", "q4"], "the column q4 is none that `plan` writes"),
         (["t", "q1", "sway"], "the column sway is none that `plan` writes"),
         (["sway"], "the column sway is none that `plan` writes"),

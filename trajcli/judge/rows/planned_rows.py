@@ -179,6 +179,8 @@ def _comparable(
         return "it has no column of time"
     if robot.convention is None and {"pose", "twist", "twistd"} & set(groups):
         return "its columns are about a tool, and the robot has no geometry"
+    if "tau" in groups and (robot.convention is None or robot.without_inertia):
+        return "it has efforts, and the robot of the job has no masses, of which they follow"
     index = np.array([where[column.kind, column.joint] for column in columns], dtype=np.intp)
     return tuple(groups), index
 
