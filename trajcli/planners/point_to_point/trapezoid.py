@@ -19,7 +19,7 @@ from trajcli.curves.trapezoid import (
     profile_of_duration,
     profile_of_speed,
 )
-from trajcli.errors import Amount, PlanningError, of_joint
+from trajcli.errors import Amount, PlanningError, Problem, of_joint
 from trajcli.kinematics.robot import Robot
 from trajcli.language.numbers import refuse
 from trajcli.language.targets import Duration, JointAccelerationMagnitudes, JointSpeeds, MinimumDuration
@@ -151,14 +151,16 @@ class Trapezoid(PointToPoint):
         displacement = end.position - start.position
         moving = (displacement != 0) | (start.velocity != 0) | (end.velocity != 0)
         forward, backward = self._rates(moving.astype(np.float64), robot)
-        profiles = []
+        profiles, problems = list[VelocityProfile](), list[Problem]()
         for joint, distance in enumerate(displacement.tolist()):
             rates = [MotionBounds(*(float(row[joint]) for row in rows)) for rows in (forward, backward)]
             speeds = float(start.velocity[joint]), float(end.velocity[joint])
             try:
                 profiles.append(self._profile(distance, *speeds, rates[0], rates[1]))
             except InfeasibleProfileError as error:
-                raise _infeasible(error, joint, 1.0, self, robot) from None
+                problems += _infeasible(error, joint, 1.0, self, robot).problems
+        if problems:
+            raise PlanningError(*problems)
         duration = self.duration or max(profile.duration for profile in profiles)
         curves, arrivals = [], []
         for joint, profile in enumerate(profiles):

@@ -464,7 +464,8 @@ def _even_in_angles(
     if len(forms) != 1:
         what = "different angles" if forms else "no angles"
         message = f"orientation: euler goes evenly in the target's angles, and the targets have {what}"
-        raise InputError(message, hint="give each target `euler` of one sequence, or `rpy`")
+        hint = "give each target `euler` of one sequence, or `rpy`, in world or a frame with its axes"
+        raise InputError(message, hint=hint)
     sequence, frame = forms.pop()
     angles = [None, *(None if target.typed is None else target.typed[0] for target in targets)]
     first = None if origin is None else _typed(origin)
