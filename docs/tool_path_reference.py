@@ -23,9 +23,10 @@ the position s on the path and the joint). Joints that a target leaves free are 
 [concepts](concepts.md#what-a-target-leaves-free).
 
 `orientation` says how the tool turns along the path: `axis_angle` about one fixed axis by the shortest angle,
-evenly in s; `euler` evenly in the three angles in which the target is given (`euler` or `rpy`), from
-those of the start that are nearest to them (see below for angles beyond 180 deg); `fixed` not at all;
-`tangent` with the path, so that the tool keeps its attitude to it, as along a seam.
+evenly in s; `euler` evenly in the three angles in which the target is given (`euler` or `rpy`, in world or
+in a frame whose axes are those of world), from those of the start that are nearest to them (see below for
+angles beyond 180 deg); `fixed` not at all; `tangent` with the path, so that the tool
+keeps its attitude to it, as along a seam.
 
 Angles beyond 180 deg are meant as they are typed: with `orientation: euler` the tool turns from 0 to 270 deg
 by 270 deg, to 360 deg by a full turn, to -270 deg the other way round. They are counted from the angles in

@@ -285,3 +285,13 @@ def test_the_branch_that_a_target_names_is_the_one_on_which_the_tool_arrives(pla
 def test_no_screw_turns_otherwise_than_about_its_axis():
     error = refusal("ur5e", START, {"planner": "screw", "to": TO, "orientation": "euler"})
     assert "unknown key 'orientation'" in str(error)
+
+
+def test_angles_typed_in_a_frame_that_is_turned_are_refused_with_what_works():
+    """Angles in such a frame are others in world: the hint says where they are to be typed."""
+    to = line(TO | {"in": "part"}, orientation="euler")
+    error = refusal("ur5e", START, to, frames={"part": {"xyz": [0, 0.01, 0], "rpy": [0, 0, 0.3]}})
+    assert "in world or a frame with its axes" in str(error.problems[0].hint)
+    made = plan("ur5e", START, to, frames={"part": {"xyz": [0, 0.01, 0]}}, when_over_limit="slow")
+    reached = forward(arm("ur5e"), made.trajectory.curve.piece_ends()[1][-1])
+    np.testing.assert_allclose(reached[:3, 3], np.add(TO["xyz"], [0, 0.01, 0]), atol=1e-5)
