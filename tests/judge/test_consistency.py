@@ -40,6 +40,21 @@ def inconsistent(motion: RecordedMotion, limits: Limits | None = None) -> list[F
 
 
 @SIDES
+@pytest.mark.parametrize(("share", "jumps"), [(0.95, False), (1.05, True)])
+def test_a_point_without_a_velocity_makes_no_jump_of_what_limits_allow_elsewhere(
+    share: float, jumps: bool, side: int
+) -> None:
+    """The velocity changes once, by that share of what the limit of 2 rad/s^2 allows between two rows."""
+    step = side * share * 2.0 * (DENSE[12] - DENSE[11])
+    qd = np.where(np.arange(COUNT) < 12, 0.0, step)
+    q = np.append(0.0, np.cumsum(np.diff(DENSE) * (qd[:-1] + qd[1:]) / 2.0))
+    qd[3] = np.nan
+    limits = replace(unlimited(1), acceleration=np.array([[-2.0, 2.0]]))
+    found = [each for each in of_points(rows(q, qd, q=1e-12, qd=1e-12), limits) if each[0] == "jump"]
+    assert found == [("jump", "velocity")] * jumps
+
+
+@SIDES
 @pytest.mark.parametrize("order", [0, 1])
 @pytest.mark.parametrize(("share", "broken"), [(0.9, False), (1.3, True)])
 def test_both_values_of_a_change_may_be_rounded(share: float, broken: bool, order: int, side: int) -> None:

@@ -134,3 +134,24 @@ def test_rows_are_missing_at_a_period_of_many_digits(count: int) -> None:
         for limit, certain in ((1.0, False), (0.999, True)):
             bounds = replace(unlimited(1), velocity=np.array([[-limit, limit]]))
             assert (judged(motion, bounds).verdict == "exceeded") == certain
+
+
+@pytest.mark.parametrize(
+    ("period", "decimals", "first"), [(0.004421159, 6, 0.0), (0.004421159, 6, 0.2e-6), (1 / 24, 3, 0.4e-3)]
+)
+@pytest.mark.parametrize("count", [13, 299])
+def test_of_a_last_row_beside_the_period_both_stamps_are_rounded(
+    count: int, period: float, decimals: int, first: float
+) -> None:
+    """All that is not known of the period, times the rows before it, and of where the rows begin."""
+    late = 0.5 * 10.0**-decimals
+    for beside in few(np.linspace(0.05, 0.95, 40), 12):
+        t = first + period * np.append(np.arange(count), count - 1 + beside)
+        for share, certain in ((1.0, False), (1.02 + 4 * late / (beside * period), True)):
+            q = np.append(t[:-1], t[-2] + share * (t[-1] - t[-2]))[:, None]
+            resolution = Resolution(late, *(np.full(1, 1e-12) for _ in range(3)))
+            motion = RecordedMotion(np.round(t, decimals), q, *6 * [None], resolution, "rows")
+            bounds = replace(unlimited(1), velocity=np.array([[-1.0, 1.0]]))
+            if certain and 4 * late > 0.5 * beside * period:
+                continue
+            assert (judged(motion, bounds).verdict == "exceeded") == certain

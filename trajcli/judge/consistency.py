@@ -119,7 +119,7 @@ def changes_of(window: Intervals) -> list[Changes]:
         change, error = np.diff(values, axis=0), off[:-1] + off[1:]
         positions = off if order == 0 else positions
         made = OF_ROUNDING[order] * np.maximum(positions[:-1], positions[1:]) / length**order
-        error = error + np.minimum(made, _MEANT_OF_ALL * np.abs(values).max(axis=0))
+        error = error + np.minimum(made, _MEANT_OF_ALL * np.nan_to_num(np.abs(values)).max(axis=0))
         stated = slack = None
         rates = states[order + 1] if order < 2 else None
         if rates is not None:
@@ -131,7 +131,7 @@ def changes_of(window: Intervals) -> list[Changes]:
             padded = np.concatenate([bend[:1], bend, bend[-1:]])
             near = np.max([padded[k : k + len(change)] for k in range(4)], axis=0)
             slack = _STEPS * length ** (2 if order == 0 else 1) * near
-            largest = np.nan_to_num(np.abs(rates)).max(axis=0)  # under `jtc` a row may state none
+            largest = np.nan_to_num(np.abs(rates)).max(axis=0)
             meant = _MEANT * largest + _MEANT_OF_ALL * largest.max()
             slack = slack + 0.5 * length * (off[:-1] + off[1:]) + late * np.abs(mean) + length * meant
         found.append(Changes(order, change, error, stated, slack))

@@ -317,7 +317,9 @@ class MotionJudge:
         lengths, late = np.diff(kept.t), kept.errors[:-1] + kept.errors[1:]
         if self._stamps.lattice is not None:
             lattice, exact = self._stamps.lattice, late == 0.0
-            steps = np.rint(lengths / lattice.period)
+            steps, counted = (np.rint(each / lattice.period) for each in (lengths, kept.t - lattice.origin))
+            beside = lattice.slack + counted[:-1] * lattice.loose  # a last row that is no multiple
+            late += np.where(kept.errors[:-1] == 0.0, beside, 0.0)
             lengths = np.where(exact, steps * lattice.period, lengths)
             late = np.where(exact, steps * lattice.loose, late)
         return Intervals(

@@ -27,6 +27,7 @@ from trajcli.kinematics.tool_derivatives import tool_derivatives
 from trajcli.limits.kinds import TOOL_KINDS, LimitKind
 from trajcli.limits.tolerances import TOOL_RELATIVE
 from trajcli.limits.tool import limits_tool, tool_excess, tool_peaks
+from trajcli.limits.tool_bound import ToolPeak
 
 if TYPE_CHECKING:
     from trajcli.planners.planner import PlannedMove
@@ -158,14 +159,19 @@ class ToolJudge:
     def _judge_limits(
         self, window: Intervals, pieces: slice, robot: Robot, move: int, *, asked: bool
     ) -> None:
-        breaks = np.append(0.0, np.cumsum(window.lengths[pieces]))  # stamps of some years are coarse
-        peaks = tool_peaks(robot, breaks, window.coefficients[:, pieces])
-        for kind in (kind for kind in TOOL_KINDS if kind.key in peaks):
-            peak = peaks[kind.key]
+        levels, surveys = window.highest[pieces], dict[int, tuple[Array, Mapping[str, ToolPeak]]]()
+        for kind in (kind for kind in TOOL_KINDS if kind.stated(robot.limits)):
             limit, order = float(getattr(robot.limits.tcp, kind.key)), kind.order or 1
-            if order > int(window.highest[pieces].max()) or peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
+            chosen = np.flatnonzero(levels >= order) + pieces.start  # points may state more than others
+            if chosen.size and chosen.size not in surveys:
+                breaks = np.append(0.0, np.cumsum(window.lengths[chosen]))  # stamps of some years are coarse
+                surveys[chosen.size] = breaks, tool_peaks(robot, breaks, window.coefficients[:, chosen])
+            if not chosen.size or kind.key not in surveys[chosen.size][1]:
                 continue
-            piece, local = self._piece_at(window, pieces, robot, kind, breaks, peak.time)
+            breaks, peak = surveys[chosen.size][0], surveys[chosen.size][1][kind.key]
+            if peak.upper_bound <= limit * (1 + TOOL_RELATIVE):
+                continue
+            piece, local = self._piece_at(window, chosen, robot, kind, breaks, peak.time)
             (rounding,) = self._roundings(window, np.array([piece]), np.array([local]), kind).tolist()
             found = _Excess(piece, local, peak.upper_bound, rounding)
             certain = found.value - limit > rounding
@@ -280,7 +286,7 @@ class ToolJudge:
 
     @staticmethod
     def _piece_at(
-        window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, breaks: Array, time: float
+        window: Intervals, pieces: NDArray[np.intp], robot: Robot, kind: LimitKind, breaks: Array, time: float
     ) -> tuple[int, float]:
         """Return which piece has its peak at a time, and when in it; of two that meet the higher one."""
         near = _MEET * float(window.lengths[pieces].min())
@@ -288,11 +294,11 @@ class ToolJudge:
         before, after = np.clip(found, 0, breaks.size - 2).tolist()
         if before != after:
             high, other = (
-                tool_peaks(robot, breaks[k : k + 2], window.coefficients[:, [pieces.start + k]])
+                tool_peaks(robot, breaks[k : k + 2], window.coefficients[:, pieces[[k]]])
                 for k in (before, after)
             )
             after = before if high[kind.key].upper_bound > other[kind.key].upper_bound else after
-        return pieces.start + after, time - float(breaks[after])
+        return int(pieces[after]), time - float(breaks[after])
 
     def _only_between(
         self, window: Intervals, pieces: slice, robot: Robot, kind: LimitKind, slack: float

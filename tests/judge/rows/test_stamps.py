@@ -290,6 +290,8 @@ def test_the_largest_move_of_a_stamp_is_remembered_either_way(late: float) -> No
         (Fraction(2, 75), 6, 100, True),  # 37.5 Hz: there is no other fraction as simple
         (Fraction(4421159, 10**9), 6, 247, False),
         (Fraction(1001, 24000), 6, 50, False),
+        (Fraction(44211, 10**7), 3, 10, False),  # several whole hertz are as near to a few milliseconds
+        (Fraction(1, 60), 3, 20, True),
     ],
 )
 def test_a_period_that_is_no_simple_fraction_is_known_to_the_rounding_of_all_stamps(

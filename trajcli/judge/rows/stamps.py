@@ -134,7 +134,8 @@ def lattice_of(t: Array, errors: Array) -> Lattice | None:
             )
             period = float(meant)
             chance = meant.denominator**2 * (high - low)  # how many fractions as simple are so near
-            loose = 0.0 if meant.numerator == 1 or chance <= _BY_CHANCE else max(high - period, period - low)
+            likely = chance <= (1.0 if meant.numerator == 1 else _BY_CHANCE)
+            loose = 0.0 if likely else max(high - period, period - low)
             break
         period = 0.5 * (low + high)
         counted *= max(0.1 * period / error, 2.0)
