@@ -137,7 +137,7 @@ def test_rows_are_missing_at_a_period_of_many_digits(count: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("period", "decimals", "first"), [(0.004421159, 6, 0.0), (0.004421159, 6, 0.2e-6), (1 / 24, 3, 0.4e-3)]
+    ("period", "decimals", "first"), [(0.004421159, 6, 0.0), (0.004421159, 6, 0.2e-6), (1 / 24, 3, -0.4e-3)]
 )
 @pytest.mark.parametrize("count", [13, 299])
 def test_of_a_last_row_beside_the_period_both_stamps_are_rounded(

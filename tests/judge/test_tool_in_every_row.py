@@ -208,15 +208,21 @@ def test_a_tool_that_stands_between_turns_is_a_warning_likewise(side: float) -> 
 def test_points_that_state_less_have_no_derivatives_of_the_tool_that_others_have(
     share: float, key: str, side: float
 ) -> None:
-    """It turns at 2 rad/s where points state positions alone, then at 1 rad/s: L w^2 and L w^3 of the latter count."""
-    t = 0.1 * np.arange(10)
-    turn = np.where(t < 0.4, 2.0 * t, 0.4 + t)
-    q = np.stack([side * turn, 0.0 * t], axis=1)
-    qd = np.stack([np.full(10, side), 0.0 * t], axis=1)
-    qd[:4] = np.nan
-    found = of_tool(rows(t, q, qd, 0.0 * q), link(**{key: share * LEVER}), "jtc")
-    assert [each.value for each in found] == [pytest.approx(LEVER, rel=1e-5)] * (share < 1.0)
-    assert all(each.row is not None and each.row > 4 for each in found)
+    """Faster where points in the middle state positions alone; then a = 0.3 rad/s^2, so that it is fastest at the end.
+
+    The acceleration is L (a^2 + w^4)^0.5, the jerk L (9 a^2 w^2 + w^6)^0.5.
+    """
+    t = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.6, 0.7, 0.9, 1.0])
+    late, a = np.maximum(t - 0.5, 0.0), 0.3
+    turn = 0.2 * np.minimum(t, 0.1) + 5.0 * np.clip(t - 0.1, 0.0, 0.4) + late + a * late**2 / 2
+    rate, still = np.where(t < 0.3, 0.2, 1.0 + a * late), 0.0 * t
+    states = [np.stack([side * each, still], axis=1) for each in (turn, rate, np.where(t < 0.3, 0.0, a))]
+    states[1][3:5] = np.nan
+    w = float(rate[-1])
+    value = LEVER * np.hypot(a, w**2) if key == "acceleration" else LEVER * np.hypot(3 * a * w, w**3)
+    found = of_tool(rows(t, *states), link(**{key: share * value}), "jtc")
+    assert [each.value for each in found] == [pytest.approx(value, rel=1e-5)] * (share < 1.0)
+    assert [(each.time, each.row) for each in found] == [(pytest.approx(1.0), 10)] * (share < 1.0)
 
 
 @SIDES
