@@ -212,7 +212,7 @@ def test_points_that_state_less_have_no_derivatives_of_the_tool_that_others_have
 
     The acceleration is L (a^2 + w^4)^0.5, the jerk L (9 a^2 w^2 + w^6)^0.5.
     """
-    t = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.6, 0.7, 0.9, 1.0])
+    t = np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.55, 0.6, 0.9, 1.0])
     late, a = np.maximum(t - 0.5, 0.0), 0.3
     turn = 0.2 * np.minimum(t, 0.1) + 5.0 * np.clip(t - 0.1, 0.0, 0.4) + late + a * late**2 / 2
     rate, still = np.where(t < 0.3, 0.2, 1.0 + a * late), 0.0 * t
