@@ -297,6 +297,7 @@ def two_joints(target: Any, start: Any = (0.0, 0.0), limits: Any = None, **field
         ),
         ({"acceleration": [9, 3]}, r"acceleration of j2 must be at least 16 rad/s\^2, got 3 rad/s\^2"),
         ({"acceleration": [7, 99]}, r"acceleration of j1 must be at least 8 rad/s\^2, got 7 rad/s\^2"),
+        ({"acceleration": [5, 8]}, r"acceleration of j2 must be at least 16 rad/s\^2, got 8 rad/s\^2"),
     ],
 )
 def test_of_joints_on_one_line_the_one_that_binds_is_named(fields: dict[str, Any], match: str) -> None:
