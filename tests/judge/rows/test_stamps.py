@@ -317,6 +317,12 @@ def test_a_last_stamp_that_is_less_than_a_period_behind_is_not_that_before_it() 
     assert exact.tolist() == [True] * 6 + [False]
 
 
+def test_a_last_stamp_at_which_the_one_before_it_was_meant_fits_no_period() -> None:
+    """In milliseconds 9 may be two periods of 5: then a last row at 10 is not behind it."""
+    with pytest.raises(UnfitError):
+        Stamps(5e-4, 0.0).taken(np.array([0.0, 0.004, 0.009, 0.010]))
+
+
 @given(st.fractions(0, 4, max_denominator=40), st.fractions(0, 1, max_denominator=30))
 def test_the_simplest_fraction_has_the_smallest_denominator(low: Fraction, width: Fraction) -> None:
     if low == 0:

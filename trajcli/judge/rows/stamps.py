@@ -91,7 +91,10 @@ class Stamps:
         fits = np.abs(t - meant) <= slack
         if not fits[:-1].all():
             raise UnfitError("a time stamp does not fit the period")
-        fits[-1] &= np.append(self._index - 1, steps)[-2] < steps[-1]
+        before = np.append(self._index - 1, steps)[-2]
+        fits[-1] &= before < steps[-1]
+        if not fits[-1] and origin + before * period >= t[-1]:
+            raise UnfitError("the last time stamp is no later than the one before it was meant")
         self._off = not fits[-1]  # the last row may stand at the end of the motion
         counted = np.diff(np.append(self._index - 1 if steps[0] else -1, steps[fits]))
         self.regular = self.regular and bool((counted == 1).all())
