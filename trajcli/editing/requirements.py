@@ -125,13 +125,13 @@ def refuse_new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMot
 
 def new_jumps(before: EditedMotion, after: EditedMotion, *more: EditedMotion) -> list[Problem]:
     """Return what is discontinuous about a motion, as it is written, and was not before, nor in `more`."""
-    kinds = {_kind(finding) for each in (before, *more) for finding in _jumps(each)}
-    found = [
-        finding
-        for finding in _jumps(after.as_written())
-        if _kind(finding) not in kinds and not _is_rounding(finding, before)
-    ]
+    found = [each for each in _more_jumps(after, before, *more) if not _is_rounding(each, before)]
     return [finding.problem(f"{before.rows.source}: {finding.text()}") for finding in found]
+
+
+def _more_jumps(after: EditedMotion, *before: EditedMotion) -> list[Finding]:
+    kinds = {_kind(finding) for each in before for finding in _jumps(each)}
+    return [finding for finding in _jumps(after.as_written()) if _kind(finding) not in kinds]
 
 
 def no_longer_excused(motion: EditedMotion, read: EditedMotion) -> tuple[str, ...]:
@@ -143,10 +143,10 @@ def no_longer_excused(motion: EditedMotion, read: EditedMotion) -> tuple[str, ..
     """
     before, after = motion.rows.resolution, read.rows.resolution
     finer = any((getattr(after, name) < getattr(before, name)).any() for name in ("q", "qd", "qdd"))
-    found = new_jumps(motion, read) if finer else ()
+    found = _more_jumps(read, motion) if finer else ()
     more = f", and {len(found) - 1} more" if len(found) > 1 else ""
     text = "`check` may find what the decimals of this file excuse, and those of the new one do not"
-    return (f"{text}: {found[0].text()}{more}",) if found else ()
+    return (f"{text}: {motion.rows.source}: {found[0].text()}{more}",) if found else ()
 
 
 def _is_rounding(finding: Finding, before: EditedMotion) -> bool:
