@@ -143,7 +143,7 @@ def test_what_joins_rows_of_flown_lines_is_beside_them_outside_of_zones_alone(ra
     """The middle between two rows of one line, joined by a straight one, is as far beside it as its coordinates say."""
     plan = flown()
     grid = UniformGrid(plan.trajectory.duration, rate)
-    judged = JoinedRows(plan, grid, ("t", "q")).judgement()
+    judged = JoinedRows(plan, grid, ("t", "q"), exact=True).judgement()
     assert judged is not None
     times = np.minimum(np.arange(grid.count) / rate, grid.duration)
     places = forward(plan.moves[0].robot, plan.trajectory.curve.evaluate(times))[:, :3, 3]
