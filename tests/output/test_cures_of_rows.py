@@ -134,26 +134,27 @@ def test_rows_of_the_tool_alone_and_at_listed_times_have_few_others(monkeypatch:
 
 
 @pytest.mark.parametrize(
-    ("form", "rows", "columns", "groups", "at_knots"),
+    ("form", "rows", "columns", "groups", "at_knots", "exact"),
     [
-        ("csv", None, ["t", "q", "move"], ["t", "q", "move"], False),
-        ("npy", None, ["t", "q", "qd"], ["t", "q", "qd"], False),
-        ("csv", "knots", ["t", "q"], ["t", "q"], True),
-        ("mcap", None, ["t", "q", "qd"], STATES, False),
-        ("ros", None, ["t", "q", "qd", "move"], ["t", "q", "qd"], True),
-        ("ros", "rate", ["t", "q", "qd"], ["t", "q", "qd"], False),
-        ("ros-goal", None, ["t", "q"], STATES, True),
+        ("csv", None, ["t", "q", "move"], ["t", "q", "move"], False, False),
+        ("npy", None, ["t", "q", "qd"], ["t", "q", "qd"], False, True),
+        ("csv", "knots", ["t", "q"], ["t", "q"], True, False),
+        ("mcap", None, ["t", "q", "qd"], STATES, False, True),
+        ("ros", None, ["t", "q", "qd", "move"], ["t", "q", "qd"], True, True),
+        ("ros", "rate", ["t", "q", "qd"], ["t", "q", "qd"], False, True),
+        ("ros-goal", None, ["t", "q"], STATES, True, True),
     ],
 )
 def test_rows_are_judged_as_their_format_writes_them(
-    form: Any, rows: str | None, columns: list[str], groups: list[str], at_knots: bool
+    form: Any, rows: str | None, columns: list[str], groups: list[str], at_knots: bool, exact: bool
 ) -> None:
-    """A log has all states, a message those of its columns, at knots unless a rate is asked for."""
+    """A log has all states, a message those of its columns, at knots unless a rate is asked for; both every bit."""
     output = {"columns": columns, "rate": 50, "start_time": -1.5, **({"rows": rows} if rows else {})}
     made = rows_of(JOB, output, form)
-    assert list(made.groups) == groups
+    assert (list(made.groups), made.exact) == (groups, exact)
     assert isinstance(made.grid, UniformGrid) != at_knots
     assert times(made)[0] == -1.5
+    assert joined_rows(made.plan, grid_of(made.plan), FORMATS[form], "full").exact
 
 
 @pytest.mark.parametrize(

@@ -162,7 +162,7 @@ def _said_to_be_over(name: str, factors: Sequence[float], none: Sequence[float])
     loaded = load_job(str(EXAMPLES / f"{name}.yaml"), ("when_over_limit=slow", "output.align=true"))
     known: dict[Any, PlannedMove] = {}
     plan = plan_job(loaded, adapted=Adaptation(fastest=known))
-    rows = JoinedRows(plan, grid_of(plan), ("t", "q", "qd", "qdd"))
+    rows = JoinedRows(plan, grid_of(plan), ("t", "q", "qd", "qdd"), exact=True)
     moves, said = StretchedMoves(rows, loaded.job.output.rate, known), 0
     for factor in factors:
         stretches = dict.fromkeys(range(len(loaded.job.moves)), factor)

@@ -101,7 +101,7 @@ def test_every_interval_that_is_not_the_planned_curve_is_judged(
         table = np.concatenate([*sample(plan.trajectory, grid, groups, robot=ROBOT)])
         times = np.concatenate([local for _, local in grid.blocks()])
         states = table[:, :-1].reshape(times.size, stated, 2)
-        joined = JoinedRows(plan, grid, ("t", *groups))
+        joined = JoinedRows(plan, grid, ("t", *groups), exact=bool(seed // 8 % 2))
         chosen = joined.interpolation
         assert chosen == ("linear", "cubic", "quintic")[stated - 1]
         seen: list[int] = []
@@ -114,8 +114,9 @@ def test_every_interval_that_is_not_the_planned_curve_is_judged(
                 assert np.abs(np.moveaxis(states[rows], 1, 0) - window.stated[:, side]).max() < 1e-12
             assert np.array_equal(window.moves, table[index, -1])
             assert np.array_equal(window.moves_after, table[index + 1, -1])
+            rounding = [0.0, 0.0] if seed // 8 % 2 else [0.5e-9, 0.5e-12]
             for of_order in (window.resolution.q, window.resolution.qd, window.resolution.qdd):
-                assert of_order == pytest.approx([0.0, 0.0], abs=0)
+                assert of_order == pytest.approx(rounding)
         assert len(seen) == len({*seen})
         assert intervals_that_differ(plan, times, states) <= {*seen}, (lengths, degree)
         assert joined.same_curve == (not seen)

@@ -76,13 +76,13 @@ def test_a_path_of_the_tool_counts() -> None:
         )
     counts = [int(pieces_within(plan, 1 / rate, 2, 2e-7).sum()) for rate in (50, 500, 50_000)]
     assert counts[0] <= counts[1] < counts[2]
-    judged = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement(slack=1e-6)
+    judged = joined_rows(plan, grid_of(plan), FORMATS["csv"], "full").judgement(slack=1e-6)
     monkey = pytest.MonkeyPatch()
     monkey.setattr(
         "trajcli.output.delivery.period_bound.pieces_within",
         lambda *_: np.zeros(plan.trajectory.curve.pieces, bool),
     )
-    all_seen = joined_rows(plan, grid_of(plan), FORMATS["csv"]).judgement(slack=1e-6)
+    all_seen = joined_rows(plan, grid_of(plan), FORMATS["csv"], "full").judgement(slack=1e-6)
     monkey.undo()
     assert judged is not None
     assert all_seen is not None

@@ -50,7 +50,7 @@ def said_of(
     known: dict[Any, PlannedMove] = {}
     plan = plan_job(loaded, adapted=Adaptation(fastest=known))
     stretched, said = (
-        StretchedMoves(JoinedRows(plan, grid_of(plan), ("t", *columns)), rate, known),
+        StretchedMoves(JoinedRows(plan, grid_of(plan), ("t", *columns), exact=True), rate, known),
         [],
     )
     for factor in factors:

@@ -52,7 +52,9 @@ def drawn(seed: int, stated: int, grid_kind: str, tools: int = 0) -> tuple[Any, 
     plan = made_plan(
         lengths, coefficients, [(n, robot, None) for n, robot in zip(counts, robots, strict=True)]
     )
-    return plan, JoinedRows(plan, made_grid(rng, plan, grid_kind), ("t", *GROUPS[:stated], "move"))
+    return plan, JoinedRows(
+        plan, made_grid(rng, plan, grid_kind), ("t", *GROUPS[:stated], "move"), exact=True
+    )
 
 
 def all_pieces(

@@ -199,7 +199,7 @@ def _beside_rows(
         return plan, None if made.joined is None else (made.rows, made.joined)
     from trajcli.output.delivery.joined import joined_rows, with_event
 
-    rows = joined_rows(plan, grid, form)
+    rows = joined_rows(plan, grid, form, options.digits or "fixed")
     plan, judged = with_event(plan, rows, form)
     return plan, None if judged is None else (rows, judged)
 

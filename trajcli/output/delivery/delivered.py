@@ -58,7 +58,7 @@ def delivered(
             from trajcli.streams.formats import DEFAULT
 
             form = form or DEFAULT
-            _refuse_events(with_event(plan, joined_rows(plan, grid_of(plan), form), form)[0])
+            _refuse_events(with_event(plan, joined_rows(plan, grid_of(plan), form, "fixed"), form)[0])
         return plan, "fixed"
     from trajcli.output.consumer import job_for, refusal_of
     from trajcli.output.delivery.for_consumer import Writing, plan_for, refusal

@@ -254,7 +254,7 @@ class _Search:
         # the curve is judged by exact numbers; what their decimals make of it is looked at apart
         writing, grid, digits = self._writing, grid_of(plan), self._writing.digits or "fixed"
         shortest = self._shortest = self._shortest or plan.trajectory.duration
-        rows, decimal = joined_rows(plan, grid, writing.form), writing.form.decimals
+        rows, decimal = joined_rows(plan, grid, writing.form, "full"), writing.form.decimals
         made = ForConsumer(plan, self._profile, grid, rows, None, None, shortest, digits, decimal)
         if not plan.verdict.passed:
             return made

@@ -31,24 +31,25 @@ _WITHOUT_JERK = 2  # derivatives that are judged of cubics
 _WITHOUT_ACCELERATION = _STATES[:3]
 
 
-def joined_rows(plan: Plan, grid: Grid, form: StreamFormat) -> JoinedRows:
+def joined_rows(plan: Plan, grid: Grid, form: StreamFormat, digits: Digits = "fixed") -> JoinedRows:
     """Return the rows of a plan as a format writes them.
 
     Args:
         plan: A plan that verifies.
         grid: Where its rows stand.
         form: The format.
+        digits: Of numbers that are written as text.
     """
-    output = plan.loaded.job.output
+    output, exact = plan.loaded.job.output, not form.decimals or digits == "full"
     if form.content == "rows":
-        return JoinedRows(plan, grid, tuple(output.columns))
+        return JoinedRows(plan, grid, tuple(output.columns), exact)
     from trajcli.knots import knot_grid, knots_of, stated_by
 
     orders = stated_by(output.columns) if form.content == "knots" else 3
     if form.content == "knots" and output.rows in (None, "knots"):
         knots = knots_of(plan.trajectory, orders)
         grid = knot_grid(plan.trajectory, knots, None, output.start_time)
-    return JoinedRows(plan, grid, _STATES[: orders + 1])
+    return JoinedRows(plan, grid, _STATES[: orders + 1], exact)
 
 
 def with_event(plan: Plan, rows: JoinedRows, form: StreamFormat) -> tuple[Plan, Judgement | None]:

@@ -61,11 +61,13 @@ class JoinedRows:
         plan: A plan that verifies.
         grid: Where its rows stand.
         groups: Its columns.
+        exact: Whether the numbers are written with every bit.
     """
 
     plan: Plan
     grid: Grid
     groups: tuple[Group, ...]
+    exact: bool = False
 
     @property
     def interpolation(self) -> Interpolation | None:
@@ -347,7 +349,8 @@ class JoinedRows:
         joints = len(self.plan.trajectory.joint_names)
         states = rows[:, :-1].reshape(len(rows), -1, joints)[where]
         moves = rows[:, -1].astype(np.int64)[where]
-        exact = np.zeros(joints)  # what decimals make of it is the file's
+        factors = joint_factors(self.plan.trajectory.joint_types, self.plan.loaded.output_units)
+        rounding = np.zeros(joints) if self.exact else _HALF_UNIT * np.asarray(factors)
         return JoinedPairs(
             t=np.append(0.0, np.cumsum(lengths)),
             lengths=lengths,
@@ -359,7 +362,7 @@ class JoinedRows:
             rows=index + 1,
             moves=moves[0],
             interpolation=chosen,
-            resolution=Resolution(0.0, exact, exact, exact),
+            resolution=Resolution(0.0, rounding, rounding, rounding),
             first=0,
             last=lengths.size,
             ends=False,
