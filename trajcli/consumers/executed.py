@@ -89,8 +89,7 @@ class IntegerRange(RuleCheck):
 
     def _take(self, rows: RecordedMotion) -> None:
         limit = self.number("unit") * self.number("largest")
-        for order, name in enumerate(("position", "velocity", "acceleration")):
-            values = (rows.q, rows.qd, rows.qdd)[order]
+        for order, values in enumerate((rows.q, rows.qd, rows.qdd)):
             if values is None:
                 continue
 

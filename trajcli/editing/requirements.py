@@ -16,7 +16,7 @@ from trajcli.findings import Finding
 from trajcli.frozen import frozen
 from trajcli.judge.consistency import OF_ROUNDING
 from trajcli.judge.motion import Requirements, judge_motion
-from trajcli.kinematics.robot import Joint, Robot, ToolLimits, unlimited
+from trajcli.kinematics.robot import QUANTITIES, Joint, Robot, ToolLimits, unlimited
 from trajcli.units import Units, amount_text
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from trajcli.planning.plan import Plan
 
 _RULES = ("continuity", "time", "derivative")
-_QUANTITIES = ("position", "velocity", "acceleration")
 _SHARES = (0.0, 0.25, 0.5, 0.75)
 """Where a piece is compared; the error of a Hermite polynomial is largest about its middle."""
 
@@ -153,7 +152,7 @@ def _is_rounding(finding: Finding, before: EditedMotion) -> bool:
     """Return whether a row between those of a file is off by what the rounding of their positions makes."""
     if finding.quantity is None or finding.joint is None or finding.time is None or finding.value is None:
         return False
-    rows, order = before.rows, _QUANTITIES.index(finding.quantity)
+    rows, order = before.rows, QUANTITIES.index(finding.quantity)
     after = min(max(int(np.searchsorted(rows.t, finding.time, side="right")), 1), rows.t.size - 1)
     length = float(rows.t[after] - rows.t[after - 1])
     off = float(rows.resolution.q[before.joint_names.index(finding.joint)])
